@@ -1,0 +1,1 @@
+"""Instruments, study designs and statistics of perceptual studies: pure functions of data."""

@@ -1,0 +1,1 @@
+"""padlab's web application: participants' pages, the experimenter's pages and the command line."""
