@@ -1,0 +1,21 @@
+"""Errors of the synthesis package: each message says what is wrong, where, and what would be right."""
+
+
+class SynthError(Exception):
+    """Base of every error that ``synth`` raises on purpose."""
+
+
+class AssetError(SynthError):
+    """The face data are missing, damaged, or could not be fetched."""
+
+
+class RenderError(SynthError):
+    """The renderer could not start or draw."""
+
+
+class VideoError(SynthError):
+    """A clip or picture could not be encoded or written."""
+
+
+class SpecError(SynthError, ValueError):
+    """A specification given by the caller is malformed or out of range."""

@@ -1,0 +1,1 @@
+"""The face: its data, its geometry, and how it looks."""
