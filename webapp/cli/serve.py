@@ -1,0 +1,93 @@
+"""``padlab serve``: gunicorn in front, a companion process that renders behind."""
+
+import multiprocessing
+import socket
+from typing import Any
+
+import click
+from gunicorn.app.base import BaseApplication
+
+from webapp import create_app, farm
+from webapp.cli.context import open_database
+from webapp.config import Settings
+from webapp.errors import ConfigError
+
+THREADS = 4
+KEEPALIVE_SECONDS = 5
+
+
+class Server(BaseApplication):  # type: ignore[misc]
+    """Gunicorn with padlab's options instead of a configuration file."""
+
+    def __init__(self, settings: Settings, options: dict[str, Any]) -> None:
+        self._settings = settings
+        self._options = options
+        super().__init__()
+
+    def load_config(self) -> None:
+        """Hand the options to gunicorn."""
+        for name, value in self._options.items():
+            self.cfg.set(name, value)
+
+    def load(self) -> Any:
+        """Build the application, in each worker."""
+        return create_app(self._settings)
+
+
+def require_free_port(host: str, port: int) -> None:
+    """Check that the server can listen.
+
+    Raises
+    ------
+    ConfigError
+        If the port is in use or the address is not this machine's.
+    """
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0][0]
+        with socket.socket(family, socket.SOCK_STREAM) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except OSError as error:
+        raise ConfigError(
+            f"padlab cannot listen on {host}, port {port} ({error.strerror or error}); "
+            f"choose another with --port (for instance --port {port + 1}) or --host"
+        ) from error
+
+
+def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
+    """Serve until stopped; clips that are pending are rendered meanwhile."""
+    renderer = multiprocessing.get_context("spawn").Process(target=farm.watch, args=(settings,), name="padlab-farm")
+    renderer.start()
+    try:
+        bind = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+        Server(
+            settings,
+            {
+                "bind": bind,
+                "workers": workers,
+                # Sync workers would wait for slow browsers to close their connections.
+                "worker_class": "gthread",
+                "threads": THREADS,
+                "keepalive": KEEPALIVE_SECONDS,
+                "loglevel": "warning",
+                "proc_name": "padlab",
+                "control_socket_disable": True,
+            },
+        ).run()
+    finally:
+        renderer.terminate()
+        renderer.join(10)
+
+
+@click.command()
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
+@click.option("--port", type=click.IntRange(1, 65535), default=8000, show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Web processes.")
+def serve(host: str, port: int, workers: int) -> None:
+    """Serve the pages, and render clips that are pending in the background."""
+    require_free_port(host, port)
+    settings, database = open_database()
+    create_app(settings)
+    database.dispose()
+    click.echo(f"padlab listens on http://{host}:{port}/ (stop with Ctrl-C)")
+    run(settings, host=host, port=port, workers=workers)

@@ -1,0 +1,142 @@
+"""The experimenter's pages. Each view parses, calls a service, answers."""
+
+import io
+import zipfile
+from typing import Any
+
+from flask import Blueprint, Response, current_app, flash, redirect, render_template, request, url_for
+from flask_babel import gettext
+from flask_login import current_user, login_required, login_user, logout_user
+from werkzeug.wrappers import Response as BaseResponse
+
+from evaluation.report import figures, html, tables
+from webapp import locale, security
+from webapp.db import Database
+from webapp.experimenter.login import Account
+from webapp.models import StudyState
+from webapp.services import clips, enrolment, experimenters, exports, results, studies
+
+blueprint = Blueprint("experimenter", __name__, url_prefix="/experimenter")
+
+
+def _database() -> Database:
+    database: Database = current_app.extensions["padlab"].database
+    return database
+
+
+def _page(template: str, **values: Any) -> str:
+    return render_template(f"experimenter/{template}", languages=list(locale.LOCALES), **values)
+
+
+@blueprint.route("/login", methods=["GET", "POST"])
+def login() -> BaseResponse | str | tuple[str, int]:
+    """Ask for name and password."""
+    target = security.own_path(request.values.get("next")) or url_for("experimenter.index")
+    if current_user.is_authenticated:
+        return redirect(target)
+    if request.method == "GET":
+        return _page("login.html", next=target)
+    with _database().read() as db:
+        found = experimenters.authenticate(db, request.form.get("name", ""), request.form.get("password", ""))
+    if found is None:
+        return _page("login.html", next=target, name=request.form.get("name", ""), failed=True), 401
+    login_user(Account(found))
+    return redirect(target, code=303)
+
+
+@blueprint.post("/logout")
+@login_required
+def logout() -> BaseResponse:
+    """End the session."""
+    logout_user()
+    return redirect(url_for("experimenter.login"), code=303)
+
+
+@blueprint.get("/")
+@login_required
+def index() -> str:
+    """List the studies."""
+    with _database().read() as db:
+        return _page("index.html", studies=studies.overviews(db))
+
+
+@blueprint.get("/<slug>/")
+@login_required
+def study(slug: str) -> str:
+    """Show what a study has collected and what it says so far."""
+    with _database().read() as db:
+        found = studies.find(db, slug)
+        report = results.report(db, slug)
+        return _page(
+            "study.html",
+            study=found,
+            spec=studies.spec_of(found),
+            progress=clips.progress(db, found),
+            failures=clips.failures(db, found),
+            participants=enrolment.participants(db, slug),
+            report=report,
+            sections=tables.sections(report),
+            figures=list(figures.NAMES),
+            states=list(StudyState),
+        )
+
+
+@blueprint.post("/<slug>/state")
+@login_required
+def set_state(slug: str) -> BaseResponse:
+    """Open or close the study."""
+    state = StudyState(request.form["state"]) if request.form.get("state") in set(StudyState) else None
+    if state is not None:
+        with _database().write() as db:
+            studies.set_state(db, slug, state)
+        flash(gettext("The study is open.") if state == StudyState.OPEN else gettext("The study is closed."), "success")
+    return redirect(url_for("experimenter.study", slug=slug), code=303)
+
+
+@blueprint.get("/<slug>/clips.json")
+@login_required
+def clip_progress(slug: str) -> dict[str, int]:
+    """Tell how far rendering is, for the progress bar."""
+    with _database().read() as db:
+        return clips.progress(db, studies.find(db, slug)).to_dict()
+
+
+@blueprint.get("/<slug>/figures/<name>.svg")
+@login_required
+def figure(slug: str, name: str) -> Response:
+    """Draw a figure of the report."""
+    with _database().read() as db:
+        svg = figures.draw(name, results.report(db, slug))
+    response = Response(svg, mimetype="image/svg+xml")
+    # Drawings carry their styles inside.
+    response.headers["Content-Security-Policy"] = security.REPORT_POLICY
+    return response
+
+
+@blueprint.get("/<slug>/report.html")
+@login_required
+def report(slug: str) -> Response:
+    """Send the whole report as one file."""
+    with _database().read() as db:
+        response = Response(html.render(results.report(db, slug)), mimetype="text/html")
+    response.headers["Content-Security-Policy"] = security.REPORT_POLICY
+    return response
+
+
+@blueprint.get("/<slug>/export.zip")
+@login_required
+def export_all(slug: str) -> Response:
+    """Send all tables as CSV in one archive."""
+    with _database().read() as db:
+        frames = exports.frames(db, slug)
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as out:
+        for name, frame in frames.items():
+            out.writestr(f"{slug}/{name}.csv", exports.to_csv(frame))
+    return _attachment(archive.getvalue(), "application/zip", f"{slug}.zip")
+
+
+def _attachment(body: bytes, mimetype: str, name: str) -> Response:
+    response = Response(body, mimetype=mimetype)
+    response.headers["Content-Disposition"] = f'attachment; filename="{name}"'
+    return response

@@ -1,0 +1,5 @@
+"""The participant's way through a study: consent, instructions, trials, debrief."""
+
+from webapp.participant.views import blueprint
+
+__all__ = ["blueprint"]
