@@ -189,7 +189,7 @@ def load_model(name: str) -> PadPepModel:
 
 
 def _least_squares(terms: Floats, values: Floats) -> Floats:
-    """Return the coefficients that bring ``terms @ coefficients`` nearest to ``values``, by SVD, never by an inverse."""
+    """Return the coefficients with ``terms @ coefficients`` nearest to ``values``: by SVD, not by an inverse."""
     return np.asarray(np.linalg.lstsq(terms, values, rcond=None)[0], dtype=np.float64)
 
 
