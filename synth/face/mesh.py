@@ -34,12 +34,15 @@ MORPH_NAMES = (
 )
 """The 52 ARKit morphs, in Apple's order; Left and Right are the subject's."""
 
-PARTS = ("upper-teeth", "lower-teeth", "tongue")
+PARTS = (
+    *("upper-teeth", "lower-teeth", "tongue"),
+    *("l-eyelashes-1", "l-eyelashes-2", "r-eyelashes-1", "r-eyelashes-2"),
+)
 
 
 @dataclass(frozen=True)
 class Part:
-    """A loose piece inside the mouth.
+    """A loose piece: teeth, tongue, lashes.
 
     Attributes
     ----------
@@ -85,7 +88,7 @@ class FaceModel:
     masks : dict of str to (V,) float64
         How much a vertex belongs to ``lips``, ``eyelids``, ``ears``, ``inside-mouth``; 0 to 1.
     parts : dict of str to Part
-        Raw helpers: ``upper-teeth``, ``lower-teeth``, ``tongue``.
+        Raw helpers, see `PARTS`; lashes 1 are the lower, 2 the upper ones.
     """
 
     vertices: Floats

@@ -1,0 +1,18 @@
+"""Appearance: everything that is seen of the face, as painted surfaces."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from synth.face.eyes import eyeballs, lashes
+from synth.face.mesh import FaceModel
+from synth.face.mouth import teeth, tongue
+from synth.face.painting import Palette, paint
+from synth.face.skin import skin
+from synth.face.surface import Surface
+
+
+def dress(face: FaceModel, palette: Palette | None = None) -> tuple[list[Surface], NDArray[np.uint8]]:
+    """Return the surfaces of the figure, the left and the right eyeball last, and the painting they refer to."""
+    colours = palette if palette is not None else Palette()
+    surfaces = [skin(face, colours), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
+    return surfaces, paint(colours)

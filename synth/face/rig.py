@@ -1,0 +1,129 @@
+"""The rig: from morph weights, head pose and gaze to the vertices of the whole figure."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import sparse
+from scipy.spatial.transform import Rotation
+
+from synth.face.appearance import dress
+from synth.face.mesh import FaceModel
+
+Floats = NDArray[np.float64]
+
+NECK_SHARE = 0.4
+"""Part of the head's rotation that happens along the neck; the rest happens at the base of the skull."""
+
+LIP_SEAL = 0.035
+"""Weight of ``mouthClose`` that is always there: subdivision parts the lips slightly."""
+
+
+class Rig:
+    """The figure that is drawn: all surfaces in one set of vertices.
+
+    Attributes
+    ----------
+    rest : (N, 3) float32
+        Neutral positions in dm.
+    triangles : (T, 3) uint32
+        Corners, counter-clockwise from outside.
+    uv : (N, 2) float32
+        Places on ``texture``.
+    gloss : (N, 2) float32
+        Strength and exponent of the highlight.
+    paint : (N, 4) float32
+        Own colour, linear light, multiplied by its cover; then the weight of the texture.
+    texture : (H, W, 3) uint8
+        The painting of skin, brows and hair, sRGB.
+    """
+
+    def __init__(self, face: FaceModel) -> None:
+        surfaces, self.texture = dress(face)
+        sizes = [len(surface.vertices) for surface in surfaces]
+        starts = np.cumsum([0, *sizes])
+        rest = np.concatenate([surface.vertices for surface in surfaces])
+        quads = np.concatenate([surface.quads + start for surface, start in zip(surfaces, starts[:-1], strict=True)])
+        morphs = np.concatenate([surface.morphs for surface in surfaces], axis=1, dtype=np.float32)
+        rest = rest + LIP_SEAL * morphs[face.morph_names.index("mouthClose")]
+
+        self.rest = rest.astype(np.float32)
+        self.triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.uint32)
+        self.uv = np.concatenate([surface.uv for surface in surfaces]).astype(np.float32)
+        self.gloss = np.concatenate([surface.gloss for surface in surfaces]).astype(np.float32)
+        self.paint = np.concatenate(
+            [
+                np.column_stack([s.colour**2 * (s.cover * s.shade)[:, None], (1 - s.cover) * s.shade])
+                for s in surfaces
+            ]
+        ).astype(np.float32)
+        self._rest = rest
+        self._quads = quads
+        # One sequential sparse product: the same result on each run, and most morphs move few vertices.
+        self._morphs = sparse.csr_array(morphs.reshape(len(morphs), -1).T.astype(np.float64))
+        self._around = sparse.csr_array(
+            (np.ones(quads.size), (quads.ravel(), np.repeat(np.arange(len(quads)), 4))), shape=(len(rest), len(quads))
+        )
+        follow = np.concatenate([surface.follow for surface in surfaces])
+        self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
+        # The last two surfaces are the left and the right eyeball.
+        self._eyes = [slice(starts[-3], starts[-2]), slice(starts[-2], starts[-1])]
+        self._eye_centres = face.eye_centres
+
+    def pose(self, weights: ArrayLike, head: ArrayLike, eyes: ArrayLike) -> tuple[Floats, Floats]:
+        """Return positions (N, 3) in dm and unit normals (N, 3); see `synth.render.Renderer.frame` for the arguments."""
+        positions = self._rest + (self._morphs @ np.asarray(weights, dtype=np.float64)).reshape(-1, 3)
+        for span, centre, (yaw, pitch) in zip(
+            self._eyes, self._eye_centres, np.asarray(eyes, dtype=np.float64), strict=True
+        ):
+            turn = Rotation.from_euler("YX", [yaw, pitch]).as_matrix()
+            positions[span] = (self._rest[span] - centre) @ turn.T + centre
+        positions = self._turns.apply(positions, np.asarray(head, dtype=np.float64))
+        return positions, self._normals(positions)
+
+    def _normals(self, positions: Floats) -> Floats:
+        """Average the quads' area-weighted normals at each vertex."""
+        a, b, c, d = (positions[self._quads[:, k]] for k in range(4))
+        normals: Floats = self._around @ _cross(c - a, d - b)
+        lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+        return normals / np.maximum(lengths, 1e-12)[:, None]
+
+
+class _Turns:
+    """The head's rotation: a share bends the neck above its root, the rest turns the skull on its base."""
+
+    def __init__(self, follow: Floats, neck: Floats, skull: Floats) -> None:
+        self._neck, self._skull = neck, skull
+        self._follow = follow
+        self._moving = np.flatnonzero((follow > 0).any(axis=1))
+
+    def apply(self, positions: Floats, head: Floats) -> Floats:
+        if not head.any():
+            return positions
+        pitch, yaw, roll = head
+        turn = Rotation.from_euler("YXZ", [yaw, pitch, roll]).as_rotvec()
+        moved = positions[self._moving]
+        follow = self._follow[self._moving]
+        moved = _rotate(moved, self._skull, (1 - NECK_SHARE) * turn, follow[:, 1])
+        moved = _rotate(moved, self._neck, NECK_SHARE * turn, follow[:, 0])
+        result = positions.copy()
+        result[self._moving] = moved
+        return result
+
+
+def _rotate(points: Floats, pivot: Floats, turn: Floats, share: Floats) -> Floats:
+    """Rotate each point about ``pivot`` by its share of the rotation vector ``turn`` (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(turn))
+    axis = turn / angle
+    arm = points - pivot
+    across = _cross(np.broadcast_to(axis, arm.shape), arm)
+    along = (arm @ axis)[:, None] * axis
+    cosine, sine = np.cos(share * angle)[:, None], np.sin(share * angle)[:, None]
+    return pivot + along + cosine * (arm - along) + sine * across
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross products of rows; a good deal faster than `numpy.cross`."""
+    result = np.empty_like(a)
+    result[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    result[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    result[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return result

@@ -1,0 +1,282 @@
+"""Rendering: frames of a face, without a display. The only module that knows pyrender and OpenGL."""
+
+import ctypes
+import functools
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from synth.errors import RenderError, SpecError
+from synth.face.mesh import FaceModel
+from synth.face.rig import Rig
+
+RENDERER_VERSION = "1"
+"""Part of a clip's identity; raise it when pictures change."""
+
+BACKGROUND = (0.800, 0.815, 0.830)
+"""Neutral backdrop, sRGB."""
+
+MIN_SIZE, MAX_SIZE = 16, 4096
+
+_INSTALL = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
+_FIELD_OF_VIEW = np.radians(20.0)
+_FLOATS = ctypes.sizeof(ctypes.c_float)
+
+
+class Renderer:
+    """Draw one face at one size; a context manager.
+
+    All renderers of a process share one OpenGL context and may be used from several threads.
+
+    Parameters
+    ----------
+    face : FaceModel
+        The face, see `synth.face.mesh.load_face`.
+    width, height : int
+        Size of the frames in pixels, each from 16 to 4096.
+
+    Raises
+    ------
+    RenderError
+        If OpenGL cannot start on this machine.
+    SpecError
+        If the size is out of range.
+    """
+
+    def __init__(self, face: FaceModel, *, width: int = 720, height: int = 576) -> None:
+        for name, size in (("width", width), ("height", height)):
+            if not MIN_SIZE <= size <= MAX_SIZE:
+                raise SpecError(f"The frame's {name} is {size}; it must be from {MIN_SIZE} to {MAX_SIZE} pixels.")
+        self.width, self.height = width, height
+        self._rig = Rig(face)
+        with _current() as gl:
+            self._drawing = gl.drawing(width, height)
+            self._mesh = gl.mesh(self._rig)
+            self._scene = gl.scene(self._mesh, *_camera(face, width, height))
+            positions, normals = self._rig.pose(np.zeros(len(face.morph_names)), (0, 0, 0), ((0, 0), (0, 0)))
+            self._vertices = gl.vertices(self._rig, positions, normals)
+            # The first drawing creates the buffers that later frames write to.
+            gl.draw(self._drawing, self._scene)
+
+    def frame(self, weights: ArrayLike, *, head: ArrayLike = (0, 0, 0), eyes: ArrayLike = ((0, 0), (0, 0))) -> Any:
+        """Draw the face in one pose.
+
+        Parameters
+        ----------
+        weights : (52,) array of float
+            Weights of the morphs in the face's order, usually 0 to 1.
+        head : (3,) array of float
+            Rotation of the head in radians: pitch (down positive), yaw (to the subject's left positive),
+            roll (towards the subject's right shoulder positive).
+        eyes : (2, 2) array of float
+            Rotation of the left and the right eye in radians: yaw (subject's left positive), pitch (down positive).
+
+        Returns
+        -------
+        (height, width, 3) uint8
+            The picture, sRGB, top row first.
+
+        Raises
+        ------
+        SpecError
+            If an argument has the wrong shape or holds values that are not finite.
+        RenderError
+            If the renderer is closed, or OpenGL fails.
+        """
+        if self._mesh is None:
+            raise RenderError("The renderer is closed; make a new one.")
+        given = {"weights": ((52,), weights), "head": ((3,), head), "eyes": ((2, 2), eyes)}
+        checked = [_finite(name, value, shape) for name, (shape, value) in given.items()]
+        positions, normals = self._rig.pose(*checked)
+        self._vertices[:, 0:3] = positions
+        self._vertices[:, 3:6] = normals
+        with _current() as gl:
+            gl.upload(self._mesh, self._vertices)
+            return gl.draw(self._drawing, self._scene)
+
+    def close(self) -> None:
+        """Free what the graphics context holds for this renderer; a second call does nothing."""
+        if self._mesh is not None:
+            with _current():
+                self._drawing.delete()
+            self._mesh = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape != shape:
+        raise SpecError(f"{name} has the shape {array.shape}; it must be {shape}.")
+    if not np.isfinite(array).all():
+        raise SpecError(f"{name} holds a value that is not a finite number.")
+    return array
+
+
+def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:
+    """Frame head and shoulders as in a video call; return the camera's position and its vertical field of view."""
+    eye_line = float(face.eye_centres[:, 1].mean())
+    head_height = float(face.pivots["head-2"][1] - face.pivots["jaw"][1])
+    shown = head_height * max(1.75, 1.45 * height / width)
+    centre = eye_line - 0.085 * shown
+    distance = shown / (2 * np.tan(_FIELD_OF_VIEW / 2))
+    return np.array([0.0, centre, distance + 1.0]), float(_FIELD_OF_VIEW)
+
+
+_lock = threading.RLock()
+
+
+@contextmanager
+def _current() -> Iterator["_Graphics"]:
+    """Make the process's graphics context current in this thread, and let it go afterwards."""
+    with _lock:
+        graphics = _graphics()
+        graphics.platform.make_current()
+        try:
+            yield graphics
+        finally:
+            graphics.release()
+
+
+@functools.cache
+def _graphics() -> "_Graphics":
+    return _Graphics()
+
+
+def _loads(*libraries: str) -> bool:
+    try:
+        for name in libraries:
+            ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL)
+    except OSError:
+        return False
+    return True
+
+
+def _choose_platform() -> str:
+    """Name the way to OpenGL without a display: EGL, else OSMesa."""
+    chosen = os.environ.get("PYOPENGL_PLATFORM", "")
+    if chosen in {"egl", "osmesa"}:
+        return chosen
+    if _loads("libGL.so.1", "libEGL.so.1"):
+        return "egl"
+    if _loads("libOSMesa.so.8") or _loads("libOSMesa.so.6"):
+        return "osmesa"
+    raise RenderError(f"There is no OpenGL for rendering without a display on this machine; run `{_INSTALL}`.")
+
+
+class _Graphics:
+    """The process's OpenGL context, and pyrender on it."""
+
+    def __init__(self) -> None:
+        name = _choose_platform()
+        os.environ["PYOPENGL_PLATFORM"] = name
+        # pyrender's viewer would load pyglet, which wants a display; pyrender 0.1.45 still says np.infty.
+        viewer = ModuleType("pyrender.viewer")
+        vars(viewer)["Viewer"] = None
+        sys.modules.setdefault("pyrender.viewer", viewer)
+        if not hasattr(np, "infty"):
+            vars(np)["infty"] = np.inf
+        try:
+            self._start(name)
+        except Exception as error:
+            raise RenderError(
+                f"OpenGL could not start by {name.upper()} ({type(error).__name__}: {error}); run `{_INSTALL}`."
+            ) from error
+
+    def _start(self, name: str) -> None:
+        import pyrender
+        from OpenGL import GL
+        from pyrender.renderer import Renderer as Drawing
+
+        class ColourDrawing(Drawing):  # type: ignore[misc]
+            """pyrender's renderer without the costly reading back of depths."""
+
+            def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[np.uint8]:
+                width, height = self._main_fb_dims
+                GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
+                GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._main_fb)
+                box = (0, 0, width, height)
+                GL.glBlitFramebuffer(*box, *box, GL.GL_COLOR_BUFFER_BIT, GL.GL_LINEAR)
+                GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb)
+                GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
+                pixels = GL.glReadPixels(*box, GL.GL_RGB, GL.GL_UNSIGNED_BYTE)
+                return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)[::-1].copy()
+
+        self._pyrender, self._gl, self._drawing_class = pyrender, GL, ColourDrawing
+        if name == "egl":
+            from pyrender.platforms import egl
+
+            self.platform: Any = egl.EGLPlatform(MIN_SIZE, MIN_SIZE)
+        else:
+            from pyrender.platforms import osmesa
+
+            self.platform = osmesa.OSMesaPlatform(MIN_SIZE, MIN_SIZE)
+        self._name = name
+        self.platform.init_context()
+
+    def release(self) -> None:
+        """Let the context go, so that another thread may take it."""
+        if self._name == "egl":
+            from OpenGL import EGL
+
+            none = (EGL.EGL_NO_SURFACE, EGL.EGL_NO_SURFACE, EGL.EGL_NO_CONTEXT)
+            EGL.eglMakeCurrent(self.platform._egl_display, *none)
+
+    def drawing(self, width: int, height: int) -> Any:
+        """Make a frame buffer with its own programs, which read this package's shaders."""
+        drawing = self._drawing_class(width, height)
+        drawing._program_cache.shader_dir = str(Path(__file__).parent / "shaders")
+        return drawing
+
+    def vertices(self, rig: Rig, positions: NDArray[Any], normals: NDArray[Any]) -> NDArray[np.float32]:
+        """Lay all attributes side by side, as pyrender's vertex buffer has them."""
+        return np.hstack([positions, normals, rig.uv, rig.gloss, rig.paint]).astype(np.float32)
+
+    def mesh(self, rig: Rig) -> Any:
+        texture = self._pyrender.Texture(source=rig.texture, source_channels="RGB")
+        material = self._pyrender.MetallicRoughnessMaterial(baseColorTexture=texture, doubleSided=True)
+        primitive = self._pyrender.Primitive(
+            positions=rig.rest,
+            normals=rig.rest,
+            texcoord_0=rig.uv,
+            texcoord_1=rig.gloss,
+            color_0=rig.paint,
+            indices=rig.triangles,
+            material=material,
+        )
+        return self._pyrender.Mesh([primitive])
+
+    def scene(self, mesh: Any, camera_at: NDArray[np.float64], field_of_view: float) -> Any:
+        scene = self._pyrender.Scene(bg_color=(*BACKGROUND, 1.0))
+        scene.add(mesh)
+        pose = np.eye(4)
+        pose[:3, 3] = camera_at
+        scene.add(self._pyrender.PerspectiveCamera(yfov=field_of_view, znear=1.0, zfar=100.0), pose=pose)
+        return scene
+
+    def upload(self, mesh: Any, vertices: NDArray[np.float32]) -> None:
+        """Write new vertices into the mesh's existing buffer."""
+        buffer = mesh.primitives[0]._buffers[0]
+        self._gl.glBindBuffer(self._gl.GL_ARRAY_BUFFER, buffer)
+        self._gl.glBufferSubData(self._gl.GL_ARRAY_BUFFER, 0, vertices.nbytes, vertices)
+        self._gl.glBindBuffer(self._gl.GL_ARRAY_BUFFER, 0)
+
+    def draw(self, drawing: Any, scene: Any) -> NDArray[np.uint8]:
+        """Draw and read the colours back."""
+        flags = self._pyrender.RenderFlags.OFFSCREEN
+        frame: NDArray[np.uint8] = drawing.render(scene, flags)
+        return frame
