@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, NamedTuple
 
 import pandas as pd
 
-from evaluation.errors import AnswerError, EvaluationError
+from evaluation.errors import AnswerError
 
 Texts = Mapping[str, str]
 """One text per language code, for instance ``{"en": "Angry", "zh": "愤怒的"}``."""

@@ -1,0 +1,1 @@
+"""Statistics of perceptual studies: arrays and frames in, frozen results out."""

@@ -1,0 +1,26 @@
+"""How numbers are written in a sentence: the style of the American Psychological Association, 7th edition."""
+
+
+def number(value: float, digits: int = 2) -> str:
+    """Return a number that may exceed 1, with a leading zero, for instance ``0.47``."""
+    # Adding 0.0 keeps "-0.00" off the page.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
+
+
+def share(value: float, digits: int = 2) -> str:
+    """Return a number that cannot exceed 1 in size, without the leading zero, for instance ``-.47``."""
+    text = number(value, digits)
+    return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
+
+
+def p_value(p: float) -> str:
+    """Return ``p = .034``, or ``p < .001`` for what is smaller."""
+    if p < 0.001:
+        return "p < .001"
+    return f"p = {share(p, 3)}" if p < 0.9995 else "p > .999"
+
+
+def interval(low: float, high: float, *, confidence: float, bounded: bool = False) -> str:
+    """Return ``95% CI [0.31, 0.62]``; without leading zeros if `bounded` by 1."""
+    write = share if bounded else number
+    return f"{100 * confidence:g}% CI [{write(low)}, {write(high)}]"
