@@ -54,7 +54,8 @@ def render_job(job: Job, media_url: str, face_dir: str) -> Outcome:
                 "The models, the face data or the renderer have changed since the study was applied; "
                 "apply the study file under a new slug"
             )
-        return render_clip(spec, path, folder)
+        lineage: dict[str, Any] = render_clip(spec, path, folder)
+        return lineage
 
     try:
         store.add(job.digest, make)
@@ -155,20 +156,29 @@ def render_unfinished(
         study = studies.find(session, slug) if slug else None
         jobs = clips.claim(session, study, statuses=statuses)
     outcomes: list[Outcome] = []
+
+    def record(outcome: Outcome) -> None:
+        with database.write() as session:
+            if outcome.error is None:
+                clips.mark_done(session, outcome.digest, outcome.size)
+            else:
+                clips.mark_failed(session, outcome.digest, outcome.error)
+        outcomes.append(outcome)
+        if on_progress is not None:
+            on_progress(len(outcomes), len(jobs))
+
     if on_progress is not None:
         on_progress(0, len(jobs))
-    if not jobs:
-        return outcomes
-    with Farm(settings, workers=workers and min(workers, len(jobs))) as farm:
-        for outcome in farm.render(jobs):
-            with database.write() as session:
-                if outcome.error is None:
-                    clips.mark_done(session, outcome.digest, outcome.size)
-                else:
-                    clips.mark_failed(session, outcome.digest, outcome.error)
-            outcomes.append(outcome)
-            if on_progress is not None:
-                on_progress(len(outcomes), len(jobs))
+    missing = []
+    for job in jobs:
+        if store.has(job.digest):
+            record(Outcome(job.digest, size=store.size(job.digest)))
+        else:
+            missing.append(job)
+    if missing:
+        with Farm(settings, workers=workers and min(workers, len(missing))) as farm:
+            for outcome in farm.render(missing):
+                record(outcome)
     return outcomes
 
 

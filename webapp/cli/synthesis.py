@@ -17,7 +17,7 @@ SIZE = re.compile(r"(\d{2,4})[x×](\d{2,4})")
 CJK = re.compile(r"[\u3400-\u9fff]")
 
 
-class SizeType(click.ParamType):
+class SizeType(click.ParamType[tuple[int, int]]):
     """A picture's size, WIDTHxHEIGHT in pixels."""
 
     name = "WxH"
@@ -45,16 +45,6 @@ def _check_out(out: Path, suffix: str) -> None:
         raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with --out")
 
 
-def _model_option(default: str) -> object:
-    return click.option(
-        "--model",
-        type=click.Choice(MODELS),
-        default=default,
-        show_default=True,
-        help="How PAD becomes a facial expression.",
-    )
-
-
 @click.command(context_settings=NEGATIVE_NUMBERS)
 @click.argument("p", type=float)
 @click.argument("a", type=float)
@@ -63,7 +53,7 @@ def _model_option(default: str) -> object:
 @click.option("--model", type=click.Choice(MODELS), default="table", show_default=True, help="From PAD to expression.")
 @click.option("--identity", default="default", show_default=True, help="Whose face.")
 @click.option("--size", type=SizeType(), default="720x576", show_default=True)
-def face(p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
+def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
     """Draw the face of the emotion P A D (pleasure, arousal, dominance, each from -1 to 1)."""
     _check_out(out, ".png")
     # Checked before the face data is fetched: a wrong number should not cost a download.
@@ -91,6 +81,7 @@ def face(p: float, a: float, d: float, out: Path, model: str, identity: str, siz
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Seed of the blinks.")
 @click.option("--lineage", type=click.Path(path_type=Path, dir_okay=False), help="Write how it was made (JSON).")
 def say(
+    *,
     text: str,
     out: Path,
     lang: str | None,

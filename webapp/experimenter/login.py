@@ -22,9 +22,11 @@ class Account(UserMixin):  # type: ignore[misc]
         self.role = experimenter.role
 
 
-@login_manager.user_loader
 def load(account_id: str) -> Account | None:
     """Return the account that a session cookie names, None when it is gone."""
     with current_app.extensions["padlab"].database.read() as db:
         experimenter = experimenters.get(db, int(account_id)) if account_id.isdigit() else None
         return Account(experimenter) if experimenter else None
+
+
+login_manager.user_loader(load)
