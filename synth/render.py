@@ -131,7 +131,7 @@ def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float6
     """Frame head and shoulders as in a video call; return the camera's position and its vertical field of view."""
     eye_line = float(face.eye_centres[:, 1].mean())
     head_height = float(face.pivots["head-2"][1] - face.pivots["jaw"][1])
-    shown = head_height * max(1.75, 1.45 * height / width)
+    shown = head_height * max(1.62, 1.42 * height / width)
     centre = eye_line - 0.085 * shown
     distance = shown / (2 * np.tan(_FIELD_OF_VIEW / 2))
     return np.array([0.0, centre, distance + 1.0]), float(_FIELD_OF_VIEW)
@@ -247,7 +247,9 @@ class _Graphics:
         return np.hstack([positions, normals, rig.uv, rig.gloss, rig.paint]).astype(np.float32)
 
     def mesh(self, rig: Rig) -> Any:
-        texture = self._pyrender.Texture(source=rig.texture, source_channels="RGB")
+        clamp = self._gl.GL_CLAMP_TO_EDGE
+        sampler = self._pyrender.Sampler(wrapS=clamp, wrapT=clamp)
+        texture = self._pyrender.Texture(source=rig.texture, source_channels="RGB", sampler=sampler)
         material = self._pyrender.MetallicRoughnessMaterial(baseColorTexture=texture, doubleSided=True)
         primitive = self._pyrender.Primitive(
             positions=rig.rest,

@@ -13,7 +13,7 @@ IRIS = np.radians(27.0)
 PUPIL = np.radians(10.5)
 """Half-angles that iris and pupil take on the ball."""
 
-_MERIDIANS = 48
+_MERIDIANS = 40
 _SCLERA = np.array([0.86, 0.835, 0.815])
 _VEIN = np.array([0.80, 0.60, 0.56])
 _LASH = np.array([0.085, 0.065, 0.06])
@@ -27,18 +27,18 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
             [0.0, PUPIL - edge, PUPIL + edge],
             np.linspace(PUPIL + edge, IRIS - 3.5 * edge, 5)[1:],
             [IRIS - edge, IRIS + edge],
-            np.linspace(IRIS + 4 * edge, np.radians(115), 12),
+            np.linspace(IRIS + 4 * edge, np.radians(80), 7),
         ]
     )
     around = np.linspace(0, 2 * np.pi, _MERIDIANS, endpoint=False)
     angle, turn = (grid.ravel() for grid in np.meshgrid(rings, around, indexing="ij"))
-    bulge = 1.0 + 0.05 * np.clip((IRIS * 1.1 - angle) / IRIS, 0, 1) ** 0.8
+    bulge = 1.0 + 0.045 * np.clip(1 - (angle / IRIS) ** 2, 0, 1)
     ball = np.stack([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)], axis=1)
     points = ball * (bulge * face.eye_radius * 0.995)[:, None]
     colour = _ball_colour(angle, turn, palette)
     # The upper lid and its lashes throw a shadow on the ball; the corners are dim.
     shade = 1.0 - 0.50 * np.clip((ball[:, 1] - 0.10) / 0.35, 0, 1) - 0.35 * np.clip((np.abs(ball[:, 0]) - 0.35) / 0.5, 0, 1)
-    gloss = np.where((angle < IRIS)[:, None], (0.75, 160.0), (0.35, 90.0))
+    gloss = np.where((angle < IRIS)[:, None], (1.6, 260.0), (0.30, 90.0))
     quads = grid_quads(len(rings), _MERIDIANS)
     still = np.zeros((len(face.morph_names), len(points), 3), dtype=np.float32)
     balls = []
@@ -51,7 +51,7 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
 def _ball_colour(angle: Floats, turn: Floats, palette: Palette) -> Floats:
     """Paint pupil, iris with spokes and a dark rim, and sclera."""
     iris = np.array(palette.iris)
-    spokes = 1.0 + 0.16 * np.sin(turn * 24) + 0.12 * np.sin(turn * 11 + 1.0)
+    spokes = 1.0 + 0.09 * np.sin(turn * 17) + 0.07 * np.sin(turn * 11 + 1.0)
     depth = np.clip((angle - PUPIL) / (IRIS - PUPIL), 0, 1)
     ring = iris * ((1.30 - 0.55 * depth**2.5) * spokes)[:, None]
     white = _SCLERA + (_VEIN - _SCLERA) * np.clip((angle - IRIS * 1.3) / 1.2, 0, 1)[:, None]
@@ -73,7 +73,7 @@ def lashes(face: FaceModel) -> list[Surface]:
     """Return the lashes: the helper strips, drawn in towards their roots."""
     strips = []
     for side in range(2):
-        for row, length in ((1, 0.25), (2, 0.62)):
+        for row, length in ((2, 0.36),):
             part = face.parts[f"{'lr'[side]}-eyelashes-{row}"]
             strips.append(_strip(part, face.eye_centres[side], face.eye_radius, length))
     return strips

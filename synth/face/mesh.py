@@ -34,6 +34,10 @@ MORPH_NAMES = (
 )
 """The 52 ARKit morphs, in Apple's order; Left and Right are the subject's."""
 
+_LID_MIDDLE = 0.06
+_LID_OVERLAP = 1.06
+"""Half-width in dm of the middle of the eye, and how much further than to touch closed lids move."""
+
 PARTS = (
     *("upper-teeth", "lower-teeth", "tongue"),
     *("l-eyelashes-1", "l-eyelashes-2", "r-eyelashes-1", "r-eyelashes-2"),
@@ -133,6 +137,7 @@ def load_face(face_dir: Path, identity: str = "default") -> FaceModel:
         rows, delta = targets[f"faceunits/{name}"]
         morphs[k, rows] = delta
 
+    _fit_blinks(morphs, arrays, shaped)
     body, quads = _part_rows(arrays["quads_body"])
     pivots = {name.replace("-eye", "_eye"): shaped[arrays[f"cube_{name}"]].mean(axis=0) for name in JOINTS}
     balls = [shaped[np.unique(arrays[f"quads_{side}-eye"])] for side in "lr"]
@@ -150,6 +155,20 @@ def load_face(face_dir: Path, identity: str = "default") -> FaceModel:
         masks={name: arrays["masks"][k, body] / 255.0 for k, name in enumerate(MASKS)},
         parts={name: _part(arrays[f"quads_{name}"], shaped, morphs) for name in PARTS},
     )
+
+
+def _fit_blinks(morphs: Morphs, arrays: Mapping[str, NDArray[Any]], shaped: Floats) -> None:
+    """Scale the blinks so that the lids of this identity just meet: they were made for the base mesh's wider eyes."""
+    for side, name in (("l", "eyeBlinkLeft"), ("r", "eyeBlinkRight")):
+        blink = morphs[MORPH_NAMES.index(name)]
+        centre = shaped[arrays[f"cube_{side}-eye"]].mean(axis=0)
+        lower, upper = (np.unique(arrays[f"quads_{side}-eyelashes-{row}"]) for row in (1, 2))
+        # Over the middle of the eye, where the lids are furthest apart.
+        lower, upper = (row[np.abs(shaped[row, 0] - centre[0]) < _LID_MIDDLE] for row in (lower, upper))
+        roots = [row[np.argmin(np.linalg.norm(shaped[row] - centre, axis=1))] for row in (lower, upper)]
+        gap = shaped[roots[1], 1] - shaped[roots[0], 1]
+        travel = blink[roots[0], 1] - blink[roots[1], 1]
+        blink *= _LID_OVERLAP * gap / travel
 
 
 class _Targets:

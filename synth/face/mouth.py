@@ -15,11 +15,13 @@ Floats = NDArray[np.float64]
 _ENAMEL = np.array([0.90, 0.865, 0.80])
 _GUM = np.array([0.72, 0.40, 0.40])
 _TONGUE = np.array([0.71, 0.37, 0.37])
+_TONGUE_REST = np.array([0.0, 0.045, 0.03])
+"""How far the tongue lies below and behind its helper; dm."""
 _GAP = np.array([0.42, 0.30, 0.26])
 
 _WIDTHS = (0.088, 0.068, 0.078, 0.070, 0.068, 0.095, 0.090)
 """Widths of the upper teeth from the middle outwards, in dm; the lower row is narrower."""
-_COLUMNS = 9
+_COLUMNS = 7
 _EDGE, _MARGIN, _ROOT = 0, 9, 13
 """Rows of the grid: the biting edge, the margin of the gum, the end of the gum."""
 
@@ -42,8 +44,8 @@ def teeth(face: FaceModel) -> list[Surface]:
     upper, lower = face.parts["upper-teeth"], face.parts["lower-teeth"]
     bite = float(upper.vertices[:, 1].min())
     rows = (
-        _Row(part=upper, up=1.0, half_width=0.305, inset=0.012, scale=1.0, edge=bite - 0.028, length=0.105),
-        _Row(part=lower, up=-1.0, half_width=0.285, inset=0.022, scale=0.86, edge=bite - 0.012, length=0.085),
+        _Row(part=upper, up=1.0, half_width=0.305, inset=0.012, scale=1.0, edge=bite - 0.042, length=0.105),
+        _Row(part=lower, up=-1.0, half_width=0.285, inset=0.022, scale=0.86, edge=bite - 0.020, length=0.085),
     )
     return [_teeth(row) for row in rows]
 
@@ -79,9 +81,9 @@ def _teeth(row: _Row) -> Surface:
         colours.append(enamel if j < _MARGIN else np.broadcast_to(_GUM, enamel.shape))
     vertices = np.concatenate(points)
     quads = grid_quads(len(levels), len(s), closed=False)
-    if row.up < 0:
+    if row.up > 0:
         quads = quads[:, ::-1]
-    dim = 1.0 - 0.62 * np.clip((np.abs(s) - 0.10) / 0.30, 0, 1) ** 1.2
+    dim = 1.0 - 0.72 * np.clip((np.abs(s) - 0.12) / 0.16, 0, 1)
     shade = np.tile(dim, len(levels)) * np.repeat(np.interp(np.arange(len(levels)), [0, 2, 8, 12], [0.5, 0.95, 0.85, 0.55]), len(s))
     morphs = _carried(row.part, vertices)
     return loose_surface(vertices, quads, morphs, np.concatenate(colours), gloss=(0.28, 50.0), shade=shade)
@@ -114,7 +116,7 @@ def tongue(face: FaceModel) -> Surface:
     """Return the tongue: its helper, subdivided."""
     part = face.parts["tongue"]
     matrix, quads = catmull_clark(part.quads, len(part.vertices))
-    vertices = matrix @ part.vertices
+    vertices = matrix @ part.vertices - _TONGUE_REST
     morphs = np.stack([matrix @ morph for morph in part.morphs])
     back = np.clip((vertices[:, 2] - vertices[:, 2].min()) / np.ptp(vertices[:, 2]), 0, 1)
     return loose_surface(vertices, quads, morphs, _TONGUE, gloss=(0.16, 18.0), shade=0.25 + 0.55 * back)

@@ -69,9 +69,9 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     picture = _skin(palette, angle, height, noise)
     picture = _mix(picture, np.multiply(palette.hair, 1.25), 0.93 * _brow(angle, height, noise))
     strands = noise.stretched(rough=(300, 5))
-    hair = np.multiply(palette.hair, (1.0 + 0.55 * strands)[..., None])
-    inside = above_hairline(angle, height) + 0.045 * noise.stretched(rough=(260, 12))
-    picture = _mix(picture, hair, _step(inside, -0.05, 0.07))
+    hair = np.multiply(palette.hair, (1.0 + 0.30 * strands)[..., None])
+    inside = above_hairline(angle, height) + 0.022 * noise.stretched(rough=(420, 10))
+    picture = _mix(picture, hair, _step(inside, -0.07, 0.06))
     shirt = np.multiply(palette.shirt, (1.0 + 0.03 * noise.stretched(rough=(500, 500)))[..., None])
     under = below_neckline(angle, height)
     seam = 1.0 - 0.22 * np.exp(-(((under - 0.11) / 0.008) ** 2))
@@ -91,15 +91,15 @@ def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> F
 
 
 def _brow(angle: Floats, height: Floats, noise: "_Noise") -> Floats:
-    """Return how much brow hair covers each place: an arch that thins towards its tail, combed outwards."""
-    along = np.clip((angle - 0.125) / 0.46, -0.2, 1.2)
-    centre = 7.475 + 0.105 * along - 0.115 * np.maximum(0.0, along - 0.55) ** 1.5 * 2.2
-    half = 0.046 * np.interp(along, [-0.1, 0.08, 0.35, 0.7, 1.0, 1.1], [0.55, 0.9, 1.0, 0.72, 0.30, 0.1])
-    across = (height - centre) / half
+    """Return how much brow hair covers each place: a gentle arch that thins towards its tail."""
+    along = (angle - 0.135) / 0.45
+    centre = 7.520 + 0.075 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.050 * np.clip(along, 0, 1.3) ** 2
+    half = 0.040 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
+    across = np.abs(height - centre) / half
     hairs = noise.slanted(angle, height)
-    body = _step(1.0 - np.abs(across) + 0.55 * hairs, -0.15, 0.75)
-    ends = _step(along, -0.06, 0.10) * (1.0 - _step(along, 0.90, 1.06))
-    return body * ends * (0.86 + 0.14 * hairs)
+    body = 1.0 - _step(across + 0.16 * hairs, 0.25, 1.35)
+    ends = _step(along, -0.10, 0.14) * (1.0 - _step(along, 0.85, 1.10))
+    return body * ends * (0.88 + 0.10 * hairs)
 
 
 class _Noise:
@@ -120,8 +120,8 @@ class _Noise:
     def slanted(self, angle: Floats, height: Floats) -> Floats:
         """Return streaks that lean outwards as they rise, as brow hairs do near the nose, and flatten further out."""
         streaks = self._rng.standard_normal(4096)
-        lean = np.interp(angle, [0.1, 0.35, 0.6], [0.25, 1.1, 2.2])
-        phase = (angle - lean * (height - 7.5)) * 320.0 + 900.0
+        lean = np.interp(angle, [0.1, 0.3, 0.6], [0.3, 1.5, 3.0])
+        phase = (angle - lean * (height - 7.5)) * 260.0 + 900.0
         low = np.floor(phase).astype(int)
         part = phase - low
         return 0.8 * (streaks[low % 4096] * (1 - part) + streaks[(low + 1) % 4096] * part)

@@ -13,9 +13,6 @@ Floats = NDArray[np.float64]
 NECK_SHARE = 0.4
 """Part of the head's rotation that happens along the neck; the rest happens at the base of the skull."""
 
-LIP_SEAL = 0.035
-"""Weight of ``mouthClose`` that is always there: subdivision parts the lips slightly."""
-
 
 class Rig:
     """The figure that is drawn: all surfaces in one set of vertices.
@@ -43,7 +40,6 @@ class Rig:
         rest = np.concatenate([surface.vertices for surface in surfaces])
         quads = np.concatenate([surface.quads + start for surface, start in zip(surfaces, starts[:-1], strict=True)])
         morphs = np.concatenate([surface.morphs for surface in surfaces], axis=1, dtype=np.float32)
-        rest = rest + LIP_SEAL * morphs[face.morph_names.index("mouthClose")]
 
         self.rest = rest.astype(np.float32)
         self.triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.uint32)

@@ -47,7 +47,7 @@ def openness(vertices: Floats, quads: NDArray[np.int64]) -> Floats:
         weight = np.maximum(0.0, cosine)
         seen += weight * visible
         possible += weight
-    return _smooth(seen / possible, quads, rounds=2)
+    return smooth(seen / possible, quads, rounds=2)
 
 
 def _spread(n: int) -> Floats:
@@ -59,7 +59,8 @@ def _spread(n: int) -> Floats:
     return np.column_stack([level * np.cos(around), up, level * np.sin(around)])
 
 
-def _smooth(values: Floats, quads: NDArray[np.int64], *, rounds: int) -> Floats:
+def smooth(values: Floats, quads: NDArray[np.int64], *, rounds: int) -> Floats:
+    """Return values (N,) of vertices, drawn halfway to their neighbours' mean in each round."""
     n = len(values)
     pairs = np.concatenate([quads[:, [0, 1]], quads[:, [1, 2]], quads[:, [2, 3]], quads[:, [3, 0]]])
     both = np.concatenate([pairs, pairs[:, ::-1]])

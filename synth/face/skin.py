@@ -2,7 +2,9 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
+from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
 from synth.face.painting import Palette, above_hairline, below_neckline, place, wrap
 from synth.face.shading import openness, vertex_normals
@@ -12,6 +14,7 @@ from synth.face.surface import Surface
 Floats = NDArray[np.float64]
 
 _MOUTH = np.array([0.40, 0.16, 0.16])
+_UPPER_LID, _LOWER_LID = np.array([0.16, 0.11, 0.10]), np.array([0.48, 0.30, 0.27])
 _HAIR_THICKNESS, _SHIRT_THICKNESS = 0.10, 0.035
 """How far hair and shirt stand off the skin; dm."""
 
@@ -19,9 +22,19 @@ _HAIR_THICKNESS, _SHIRT_THICKNESS = 0.10, 0.035
 def skin(face: FaceModel, palette: Palette) -> Surface:
     """Return head, neck and shoulders, subdivided once, with the hair's and the shirt's thickness added."""
     matrix, quads = catmull_clark(face.quads, len(face.vertices))
+    matrix = _firm(matrix, np.maximum(face.masks["lips"], face.masks["eyelids"]))
     vertices, template = matrix @ face.vertices, matrix @ face.template
+    morphs = np.stack([matrix @ morph for morph in face.morphs])
     masks = {name: np.clip(matrix @ mask, 0, 1) for name, mask in face.masks.items()}
     ears, lips, mouth = masks["ears"], masks["lips"], masks["inside-mouth"]
+    jaw_drop = -morphs[face.morph_names.index("jawOpen"), :, 1]
+    vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
+    side = _step(vertices[:, 0], -0.1, 0.1)[:, None]
+    for name in CLOSED:
+        left, right = (morphs[face.morph_names.index(name + side_name)] for side_name in ("Left", "Right"))
+        seal = sealing(vertices + left + right, quads, lips, jaw_drop)
+        left += side * seal
+        right += (1 - side) * seal
     angle, height = wrap(template)
     hair = _step(above_hairline(angle, height), 0.0, 0.35) * (1 - _step(ears, 0.0, 0.3))
     shirt = _step(below_neckline(angle, height), -0.01, 0.05)
@@ -33,14 +46,16 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
 
     colour = np.broadcast_to(np.array(palette.skin), vertices.shape)
     cover = _step(ears, 0.1, 0.6)
-    for mask, paint, strength in ((lips, palette.lips, 0.85), (mouth, _MOUTH, 1.0)):
+    upper, lower = (_lid_line(face, vertices, row) for row in (2, 1))
+    paints = ((lips, palette.lips, 0.85), (mouth, _MOUTH, 1.0), (lower, _LOWER_LID, 0.45), (upper, _UPPER_LID, 0.9))
+    for mask, paint, strength in paints:
         colour = colour + (np.asarray(paint) - colour) * (mask > 0.02)[:, None]
         cover = np.maximum(cover, strength * _step(mask, 0.1, 0.9))
     gloss = np.stack([0.075 + 0.15 * lips - 0.075 * shirt + 0.10 * hair, 12.0 + 16.0 * lips + 10 * hair], axis=1)
     return Surface(
         vertices=vertices,
         quads=quads,
-        morphs=np.stack([matrix @ morph for morph in face.morphs]),
+        morphs=morphs,
         uv=place(template),
         colour=colour,
         cover=cover,
@@ -48,6 +63,28 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         gloss=gloss,
         follow=_follow(face, vertices),
     )
+
+
+def _firm(matrix: sparse.csr_array, places: Floats) -> sparse.csr_array:
+    """Keep lips and lids where the control mesh has them: smoothing alone would part lips that touch.
+
+    The control points are moved beforehand by as much as the subdivision draws them in.
+    """
+    n = matrix.shape[1]
+    drawn_in = sparse.eye_array(n) - matrix[:n]
+    return sparse.csr_array(matrix @ (sparse.eye_array(n) + sparse.diags_array(_step(places, 0.0, 0.5)) @ drawn_in))
+
+
+def _lid_line(face: FaceModel, vertices: Floats, row: int) -> Floats:
+    """Return how much each vertex belongs to the margin of the lower (row 1) or upper lids (row 2)."""
+    line = np.zeros(len(vertices))
+    for side, centre in zip("lr", face.eye_centres, strict=True):
+        lashes = face.parts[f"{side}-eyelashes-{row}"].vertices
+        roots = lashes[np.linalg.norm(lashes - centre, axis=1) < 1.22 * face.eye_radius]
+        near = np.flatnonzero(np.linalg.norm(vertices - centre, axis=1) < 2 * face.eye_radius)
+        distance = np.linalg.norm(vertices[near, None] - roots, axis=2).min(axis=1)
+        line[near] = np.maximum(line[near], 1 - _step(distance, 0.006, 0.020))
+    return line
 
 
 def _follow(face: FaceModel, vertices: Floats) -> Floats:
