@@ -1,0 +1,1 @@
+"""From answers to tables, figures and one readable report."""

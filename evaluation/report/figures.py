@@ -1,0 +1,254 @@
+"""The figures of a report, as SVG."""
+
+import io
+import re
+from collections.abc import Callable
+from threading import Lock
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from evaluation.errors import EvaluationError
+from evaluation.instruments.mos import MOS5
+from evaluation.report.analysis import ReverseEvaluation, StudyReport, Unavailable
+from evaluation.report.labels import place_labels
+from evaluation.report.tables import label
+from evaluation.responses import DIMENSIONS
+from evaluation.statistics import wording
+from evaluation.statistics.opinion import OpinionScore
+
+# Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008); shapes tell the same again.
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
+_SHAPES = ("o", "s", "^", "D", "v", "P")
+_INK, _SOFT, _GRID = "#222222", "#6b6b6b", "#e3e3e3"
+
+# Text stays text, so that it can be read aloud, searched and shown in the reader's fonts; fixed ids make the drawing
+# of the same data the same file.
+_SETTINGS: dict[Any, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "padlab",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Noto Sans", "sans-serif"],
+    "axes.unicode_minus": True,
+}
+_drawing = Lock()
+
+_NAMES_OF_DIMENSIONS = {"P": "Pleasure", "A": "Arousal", "D": "Dominance"}
+
+
+def draw(name: str, report: StudyReport) -> str:
+    """Return a figure as the text of an SVG file, the same for the same report.
+
+    Parameters
+    ----------
+    name : str
+        One of `NAMES`.
+    report : StudyReport
+        As `evaluation.report.analysis.analyse` returns it. Where there is nothing to draw yet, the figure says so.
+
+    Returns
+    -------
+    str
+        An ``<svg>`` element, without XML declaration; its ids begin with the figure's name, so that several figures
+        can stand on one page.
+
+    Raises
+    ------
+    EvaluationError
+        If there is no figure of this name.
+    """
+    if name not in _FIGURES:
+        raise EvaluationError(f"There is no figure {name!r}; there are {', '.join(_FIGURES)}.")
+    out = io.StringIO()
+    # matplotlib reads these settings from the whole process while it draws, so drawings take turns.
+    with _drawing, mpl.rc_context(_SETTINGS):
+        _FIGURES[name](report).savefig(out, format="svg", metadata={"Date": None, "Creator": None})
+    svg = out.getvalue()
+    return _with_own_ids(svg[svg.index("<svg") :], name)
+
+
+def caption(name: str) -> str:
+    """Return the sentence that stands under a figure; EvaluationError if there is none of this name."""
+    if name not in _CAPTIONS:
+        raise EvaluationError(f"There is no figure {name!r}; there are {', '.join(_FIGURES)}.")
+    return _CAPTIONS[name]
+
+
+def reverse_evaluation(report: StudyReport) -> Figure:
+    """Draw evaluated against input PAD: a panel for each dimension, a labelled point for each stimulus.
+
+    Parameters
+    ----------
+    report : StudyReport
+        The analysis.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Three panels with equal axes from -1 to 1 or less, the line of equality, the least-squares line and r.
+
+    References
+    ----------
+    Jia et al. (2013), Table 8, drawn.
+    """
+    figure = Figure(figsize=(12.6, 4.9), layout="constrained")
+    panels = figure.subplots(1, 3)
+    limit = _pad_limit(report)
+    pooled = {found.dimension: found for found in report.reverse_evaluation if found.condition is None}
+    for axes, dimension in zip(panels, DIMENSIONS, strict=True):
+        _prepare(axes)
+        axes.axhline(0, color=_GRID, linewidth=1, zorder=0)
+        axes.axvline(0, color=_GRID, linewidth=1, zorder=0)
+        axes.plot([-limit, limit], [-limit, limit], color=_SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+        axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+        axes.set_xlabel(f"Input {dimension}", color=_INK)
+        axes.set_ylabel(f"Evaluated {dimension}", color=_INK)
+        _draw_dimension(axes, report, pooled[dimension], limit)
+    handles, names = panels[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, names, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=9)
+    return figure
+
+
+def mos(report: StudyReport) -> Figure:
+    """Draw the mean opinion score of each condition with its interval, and that of each stimulus behind it.
+
+    Parameters
+    ----------
+    report : StudyReport
+        The analysis.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel, the scale of 1 to 5 upwards with its labels.
+
+    References
+    ----------
+    Jia et al. (2013), Table 10, drawn.
+    """
+    figure = Figure(figsize=(2.4 + 1.7 * max(2, len(report.mos_by_condition)), 4.6), layout="constrained")
+    axes = figure.subplots()
+    _prepare(axes)
+    axes.grid(axis="y", color=_GRID)
+    axes.set_axisbelow(True)
+    for place, found in enumerate(report.mos_by_condition):
+        colour, shape = _COLOURS[place % len(_COLOURS)], _SHAPES[place % len(_SHAPES)]
+        cells = report.mos_by_cell[report.mos_by_cell["condition"] == found.condition]["mean"].to_numpy(dtype=float)
+        # Stimuli side by side in the order of the file, so that a place on the page is always the same stimulus.
+        beside = place - 0.3 + np.linspace(-0.12, 0.12, len(cells)) if len(cells) else np.array([])
+        axes.plot(beside, cells, linestyle="", marker="o", markersize=4, color=colour, alpha=0.35, markeredgewidth=0)
+        if isinstance(found.result, OpinionScore):
+            _draw_opinion(axes, place, found.result, colour, shape)
+        else:
+            axes.text(place, 3, "no ratings\nyet", ha="center", va="center", color=_SOFT, fontsize=9)
+    names = [_drawable(label(report.spec.condition(c.name).label), c.name) for c in report.spec.conditions]
+    axes.set_xticks(range(len(names)), names)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    options = sorted(MOS5.items[0].options, key=lambda option: option.value) if MOS5.items[0].kind == "likert" else []
+    axes.set_yticks([option.value for option in options], [f"{o.label['en']}  {o.value}" for o in options])
+    axes.set_ylim(0.8, 5.2)
+    axes.set_ylabel("Mean opinion score", color=_INK)
+    return figure
+
+
+_FIGURES: MappingProxyType[str, Callable[[StudyReport], Figure]] = MappingProxyType(
+    {"reverse_evaluation": reverse_evaluation, "mos": mos}
+)
+_CAPTIONS = MappingProxyType(
+    {
+        "reverse_evaluation": (
+            "Evaluated against input PAD. Black points: each stimulus over all conditions, with the least-squares line "
+            "and Pearson's r; coloured points: each condition. On the dashed line people see what was put in."
+        ),
+        "mos": (
+            "Mean opinion score of each condition over all ratings, with its 95 % interval; the small points on its "
+            "left are the stimuli."
+        ),
+    }
+)
+NAMES = tuple(_FIGURES)
+"""Names of the figures, in the order of the report."""
+
+
+def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, limit: float) -> None:
+    dimension = found.dimension
+    for place, condition in enumerate(report.spec.conditions):
+        cells = report.pad_by_cell[report.pad_by_cell["condition"] == condition.name]
+        if len(report.spec.conditions) > 1 and len(cells):
+            axes.plot(
+                cells[f"input_{dimension}"].to_numpy(dtype=float),
+                cells[dimension].to_numpy(dtype=float),
+                linestyle="",
+                marker=_SHAPES[place % len(_SHAPES)],
+                markersize=4.5,
+                color=_COLOURS[place % len(_COLOURS)],
+                alpha=0.55,
+                markeredgewidth=0,
+                label=_drawable(label(condition.label), condition.name),
+                zorder=2,
+            )
+    means = report.pad_by_stimulus
+    xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)
+    name = _NAMES_OF_DIMENSIONS[dimension]
+    if isinstance(found.result, Unavailable):
+        axes.set_title(name, color=_INK, fontsize=12)
+        axes.text(0, limit * 0.5, _wrapped(found.result.reason), ha="center", va="center", color=_SOFT, fontsize=9)
+        return
+    axes.set_title(f"{name}: r = {wording.share(found.result.r)}", color=_INK, fontsize=12)
+    ends = np.array([xs.min(), xs.max()])
+    axes.plot(ends, found.result.intercept + found.result.slope * ends, color=_INK, linewidth=1.4, zorder=3)
+    axes.plot(xs, ys, linestyle="", marker="o", markersize=5, color=_INK, label="All conditions", zorder=4)
+    words = [_drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
+    place_labels(axes, xs, ys, words, color=_INK, size=7.5)
+
+
+def _draw_opinion(axes: Axes, place: int, found: OpinionScore, colour: str, shape: str) -> None:
+    if found.ci is not None:
+        low, high = found.ci
+        axes.plot([place, place], [low, high], color=colour, linewidth=2.2, solid_capstyle="butt")
+        for end in (low, high):
+            axes.plot([place - 0.06, place + 0.06], [end, end], color=colour, linewidth=2.2)
+    axes.plot([place], [found.mean], marker=shape, markersize=9, color=colour, markeredgecolor="white")
+    axes.annotate(
+        wording.number(found.mean),
+        (place, found.mean),
+        xytext=(12, 0),
+        textcoords="offset points",
+        va="center",
+        color=_INK,
+        fontsize=11,
+    )
+
+
+def _prepare(axes: Axes) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(_SOFT)
+    axes.tick_params(colors=_INK, labelsize=9, length=3)
+
+
+def _pad_limit(report: StudyReport) -> float:
+    columns = [f"{prefix}{dimension}" for prefix in ("input_", "") for dimension in DIMENSIONS]
+    values = np.abs(report.pad_by_cell[columns].to_numpy(dtype=float))
+    largest = float(np.nanmax(values)) if values.size and not np.isnan(values).all() else 1.0
+    return min(1.05, float(np.ceil(largest * 10 + 0.5)) / 10)
+
+
+def _drawable(text: str, otherwise: str) -> str:
+    # matplotlib's own font measures the text, and it has no Chinese characters.
+    return text if all(ord(character) < 0x0500 for character in text) else otherwise
+
+
+def _wrapped(text: str) -> str:
+    return re.sub(r"(.{20,34}) ", r"\1\n", text)
+
+
+def _with_own_ids(svg: str, name: str) -> str:
+    prefix = name.replace("_", "-")
+    svg = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', svg)
+    svg = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', svg)
+    return re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", svg)

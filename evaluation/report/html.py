@@ -1,0 +1,60 @@
+"""The report as one HTML file that needs nothing else: no scripts, no fonts, no network."""
+
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from markupsafe import Markup
+
+from evaluation.report import figures, tables
+from evaluation.report.analysis import StudyReport
+
+
+def render(report: StudyReport) -> str:
+    """Return the report as the text of an HTML file, the same for the same report.
+
+    Parameters
+    ----------
+    report : StudyReport
+        As `evaluation.report.analysis.analyse` returns it.
+
+    Returns
+    -------
+    str
+        HTML in English with figures as inline SVG; every text of the study is escaped.
+    """
+    drawings = [
+        # The drawing is made by figures.draw, whose texts matplotlib has escaped.
+        {"svg": Markup(figures.draw(name, report)), "caption": figures.caption(name)}  # noqa: S704
+        for name in figures.NAMES
+    ]
+    return _template().render(
+        title=tables.label(report.spec.title),
+        report=report,
+        sections=tables.sections(report),
+        drawings=drawings,
+        headline=_headline(report),
+    )
+
+
+def _headline(report: StudyReport) -> list[str]:
+    """Return the main results as sentences."""
+    names = {"P": "pleasure", "A": "arousal", "D": "dominance"}
+    sentences = [
+        f"Input and evaluated {names[found.dimension]}: {found.result.summary()}"
+        for found in report.reverse_evaluation
+        if found.condition is None
+    ]
+    return [*sentences, f"Opinion scores of the conditions: {report.mos_anova.summary()}"]
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("evaluation.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("report.html")
