@@ -20,23 +20,47 @@ Indices = NDArray[np.int64]
 MAX_WEIGHT = 1.5
 """Largest weight of a morph: the morphs at 1 look weak on video, and bear half as much again."""
 
-# These morphs reach their end at 1: beyond it lids cross and jaws unhinge.
-_FULL_AT_ONE = frozenset({"eyeBlinkLeft", "eyeBlinkRight", "jawOpen", "mouthClose", "mouthRollLower", "mouthRollUpper"})
+# Beyond these weights lids cross, jaws unhinge and cheeks crease like paper.
+_LIMIT_OF = {
+    **dict.fromkeys(("eyeBlinkLeft", "eyeBlinkRight", "cheekSquintLeft", "cheekSquintRight"), 1.0),
+    **dict.fromkeys(("jawOpen", "mouthClose", "mouthRollLower", "mouthRollUpper"), 1.0),
+    **dict.fromkeys(("mouthSmileLeft", "mouthSmileRight"), 1.15),
+}
 
 # Gaze moves the eyeballs themselves; these morphs only let the lids follow.
 _FOLLOWERS = ("eyeLookUp", "eyeLookDown", "eyeLookIn", "eyeLookOut")
 _FOLLOW_ANGLE = 0.6
 """Turn of an eye, in radians, at which its lids have followed all the way."""
 
-# How much a FAP's distance counts. Lids are small and their opening is seen at once. What no PEP drives (depth of lips
-# and jaw, cheeks, nose) may be dragged along by the movement of others, as flesh is.
+# How much a FAP's distance counts, as a factor. Lids are small and their opening is seen at once. A point that is asked
+# to stay while its neighbours go may be dragged along a little, as flesh is, and what no PEP drives (depth of lips and
+# jaw, cheeks, nose) may be dragged even more.
 _LID_COUNT = 3.0
-_DRAGGED_COUNT = 0.2
+_STAY_COUNT = 0.15
+_DRAGGED_COUNT = 0.1
 _DRAGGED = frozenset({14, 16, 17, 18, 39, 40, 41, 42, 61, 62, 63})
+_REGION_OF_GROUP = {2: "mouth", 8: "mouth", 3: "eyes", 4: "brows", 5: "cheeks", 9: "nose"}
 
-# Cost of a weight of 1, as a distance in dm: small, so that it only decides between morphs that do the same.
-_COST = 0.003
-_COST_OF = {"cheekPuff": 0.03, "mouthFunnel": 0.01, "mouthRollUpper": 0.01, "mouthRollLower": 0.01}
+# A smile lifts the cheeks (AU 6 comes with AU 12), which no PEP can say. Where the cheek's FAP is 0, its point is asked
+# to go up with the corner of the mouth: cheek FAP, corner FAP, share of the corner's distance.
+_LIFTED_CHEEKS = ((41, 12), (42, 13))
+_LIFT = 0.5
+_LIFT_COUNT = 0.4
+
+# How wide the lips part is seen before all else, so the gaps between inner upper and lower lip points are rows of
+# their own: the sum of two FAPs that both close.
+_LIP_GAPS = ((4, 5), (8, 10), (9, 11))
+_GAP_COUNT = 1.5
+
+# Cost of a weight of 1, as a distance in dm: small, so that it only decides between morphs that do the same. Morphs
+# that are no part of an ordinary expression cost more, as those that pull the mouth to one side.
+_COST = 0.004
+_COST_OF = {
+    **dict.fromkeys(("mouthLeft", "mouthRight", "jawLeft", "jawRight"), 0.06),
+    **dict.fromkeys(("cheekPuff", "jawForward", "mouthFunnel", "mouthRollUpper", "mouthRollLower"), 0.03),
+    **dict.fromkeys(("mouthPucker", "mouthPressLeft", "mouthPressRight"), 0.02),
+    **dict.fromkeys(("mouthLowerDownLeft", "mouthLowerDownRight"), 0.008),
+}
 
 _STEPS = 600
 _RELAXATION = 1.6
@@ -86,7 +110,9 @@ def solve(values: NDArray[np.floating] | Floats, face: FaceModel) -> Motion:
     sequence = check_sequence(values)
     system = _System(face)
     weights = np.zeros((len(sequence), len(face.morph_names)))
-    weights[:, system.morphs] = system.solve(sequence)
+    # Clips hold still for long: each different frame is solved once.
+    frames, place = np.unique(sequence, axis=0, return_inverse=True)
+    weights[:, system.morphs] = system.solve(frames)[place.reshape(-1)]
     head = sequence[:, [column(48), column(49), column(50)]] * ANGLE_UNIT
     left = sequence[:, [column(23), column(25)]]
     right = sequence[:, [column(24), column(26)]]
@@ -117,17 +143,44 @@ class _System:
         reach = np.einsum("mfx,fx->fm", face.morphs[self.morphs][:, points].astype(np.float64), directions)
         self._columns = np.array([column(fap.fap) for fap in rows])
         reach = _symmetrised(reach, rows, names)
-        counts = np.array([_count(fap) for fap in rows])
-        self._wanted = FaceUnits.measure(face).steps()[self._columns] * counts**2
+        self._steps = FaceUnits.measure(face).steps()[self._columns]
         costs = np.array([_COST_OF.get(name, _COST) for name in names])
-        self._normal = reach.T @ (reach * counts[:, None] ** 2) + np.diag(costs**2)
-        self._reach = reach
-        self._limit = np.array([1.0 if name in _FULL_AT_ONE else MAX_WEIGHT for name in names])
+        self._cost = np.diag(costs**2)
+        numbers = [fap.fap for fap in rows]
+        self._cheeks, self._corners = np.array([[numbers.index(fap) for fap in pair] for pair in _LIFTED_CHEEKS]).T
+        self._gaps = np.zeros((len(_LIP_GAPS), len(rows)))
+        for k, pair in enumerate(_LIP_GAPS):
+            self._gaps[k, [numbers.index(fap) for fap in pair]] = 1.0
+        self._reach = np.vstack([reach, self._gaps @ reach])
+        self._limit = np.array([_LIMIT_OF.get(name, MAX_WEIGHT) for name in names])
+        regions = [_REGION_OF_GROUP[fap.group] for fap in rows]
+        self._same_region = np.array([[one == other for one in regions] for other in regions], dtype=np.float64)
+        self._same_region /= self._same_region.sum(axis=1, keepdims=True)
+        self._moving_count = np.array([_count(fap) for fap in rows])
+        self._moving_count[self._cheeks] = _LIFT_COUNT
+        self._staying_count = np.array([_STAY_COUNT * _count(fap) for fap in rows])
 
     def solve(self, sequence: Floats) -> Floats:
         """Return the weights (T, M) of the system's morphs for all frames at once."""
-        wanted = (sequence[:, self._columns] * self._wanted) @ self._reach
-        return _bounded_least_squares(self._normal, wanted, self._limit)
+        distances = sequence[:, self._columns] * self._steps
+        still = distances[:, self._cheeks] == 0.0
+        distances[:, self._cheeks] += still * _LIFT * np.maximum(distances[:, self._corners], 0.0)
+        counts = np.hstack([self._counts(distances), np.full((len(distances), len(_LIP_GAPS)), _GAP_COUNT)])
+        distances = np.hstack([distances, distances @ self._gaps.T])
+        normal = np.einsum("tf,fm,fn->tmn", counts**2, self._reach, self._reach, optimize=True) + self._cost
+        wanted = (distances * counts**2) @ self._reach
+        return _bounded_least_squares(normal, wanted, self._limit)
+
+    def _counts(self, distances: Floats) -> Floats:
+        """Return how much each FAP counts in each frame: (T, F).
+
+        A FAP counts as moving by its share in the mean square of its region. This does not depend on how far the whole
+        region goes, so half the values give half the weights, and an expression grows along a straight line.
+        """
+        squares = distances**2
+        moving: Floats = squares / np.maximum(squares + squares @ self._same_region.T, 1e-30)
+        counts: Floats = self._staying_count + (self._moving_count - self._staying_count) * moving
+        return counts
 
 
 def _count(fap: Fap) -> float:
@@ -153,19 +206,33 @@ def _other_side(name: str) -> str:
 
 
 def _bounded_least_squares(normal: Floats, wanted: Floats, limit: Floats) -> Floats:
-    """Minimise ``w N w / 2 - wanted w`` over 0 <= w <= limit for every row of ``wanted``: (T, M) to (T, M).
+    """Minimise ``w N w / 2 - b w`` over 0 <= w <= limit for each of T problems.
 
     The alternating direction method of multipliers with over-relaxation (Boyd et al. 2011, section 3.4.3) solves all
-    rows together with one factorisation; a fixed number of steps makes the result a pure function of the input.
+    problems together; a fixed number of steps makes the result a pure function of the input.
+
+    Parameters
+    ----------
+    normal : (T, M, M)
+        Symmetric positive definite matrices N.
+    wanted : (T, M)
+        Right-hand sides b.
+    limit : (M,)
+        Upper bounds.
+
+    Returns
+    -------
+    (T, M) float64
+        The weights.
     """
     spectrum, basis = np.linalg.eigh(normal)
     # The geometric mean of the extreme eigenvalues is the penalty with the best guaranteed rate.
-    penalty = float(np.sqrt(spectrum[0] * spectrum[-1]))
-    inverse = (basis / (spectrum + penalty)) @ basis.T
+    penalty = np.sqrt(spectrum[:, :1] * spectrum[:, -1:])
+    inverse = (basis / (spectrum + penalty)[:, None, :]) @ basis.transpose(0, 2, 1)
     bounded = np.zeros_like(wanted)
     dual = np.zeros_like(wanted)
     for _ in range(_STEPS):
-        free = (wanted + penalty * (bounded - dual)) @ inverse
+        free = (inverse @ (wanted + penalty * (bounded - dual))[:, :, None])[:, :, 0]
         relaxed = _RELAXATION * free + (1.0 - _RELAXATION) * bounded
         bounded = np.clip(relaxed + dual, 0.0, limit)
         dual += relaxed - bounded
