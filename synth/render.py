@@ -2,9 +2,11 @@
 
 import ctypes
 import functools
+import importlib
 import os
 import sys
 import threading
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,6 +61,8 @@ class Renderer:
         self._rig = Rig(face)
         with _current() as gl:
             self._drawing = gl.drawing(width, height)
+            # Also at the interpreter's end, while OpenGL still works.
+            self._free = weakref.finalize(self, _delete, self._drawing)
             self._mesh = gl.mesh(self._rig)
             self._scene = gl.scene(self._mesh, *_camera(face, width, height))
             positions, normals = self._rig.pose(np.zeros(len(face.morph_names)), (0, 0, 0), ((0, 0), (0, 0)))
@@ -66,7 +70,9 @@ class Renderer:
             # The first drawing creates the buffers that later frames write to.
             gl.draw(self._drawing, self._scene)
 
-    def frame(self, weights: ArrayLike, *, head: ArrayLike = (0, 0, 0), eyes: ArrayLike = ((0, 0), (0, 0))) -> Any:
+    def frame(
+        self, weights: ArrayLike, *, head: ArrayLike = (0, 0, 0), eyes: ArrayLike = ((0, 0), (0, 0))
+    ) -> NDArray[np.uint8]:
         """Draw the face in one pose.
 
         Parameters
@@ -104,10 +110,8 @@ class Renderer:
 
     def close(self) -> None:
         """Free what the graphics context holds for this renderer; a second call does nothing."""
-        if self._mesh is not None:
-            with _current():
-                self._drawing.delete()
-            self._mesh = None
+        self._free()
+        self._mesh = None
 
     def __enter__(self) -> Self:
         return self
@@ -116,6 +120,11 @@ class Renderer:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _delete(drawing: Any) -> None:
+    with _current():
+        drawing.delete()
 
 
 def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -198,49 +207,39 @@ class _Graphics:
             ) from error
 
     def _start(self, name: str) -> None:
-        import pyrender
-        from OpenGL import GL
-        from pyrender.renderer import Renderer as Drawing
-
-        class ColourDrawing(Drawing):  # type: ignore[misc]
-            """pyrender's renderer without the costly reading back of depths."""
-
-            def _read_main_framebuffer(self, scene: Any, flags: int) -> NDArray[np.uint8]:
-                width, height = self._main_fb_dims
-                GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb_ms)
-                GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._main_fb)
-                box = (0, 0, width, height)
-                GL.glBlitFramebuffer(*box, *box, GL.GL_COLOR_BUFFER_BIT, GL.GL_LINEAR)
-                GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._main_fb)
-                GL.glPixelStorei(GL.GL_PACK_ALIGNMENT, 1)
-                pixels = GL.glReadPixels(*box, GL.GL_RGB, GL.GL_UNSIGNED_BYTE)
-                return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)[::-1].copy()
-
-        self._pyrender, self._gl, self._drawing_class = pyrender, GL, ColourDrawing
-        if name == "egl":
-            from pyrender.platforms import egl
-
-            self.platform: Any = egl.EGLPlatform(MIN_SIZE, MIN_SIZE)
-        else:
-            from pyrender.platforms import osmesa
-
-            self.platform = osmesa.OSMesaPlatform(MIN_SIZE, MIN_SIZE)
-        self._name = name
+        self._pyrender = importlib.import_module("pyrender")
+        self._gl = importlib.import_module("OpenGL.GL")
+        self._egl = importlib.import_module("OpenGL.EGL") if name == "egl" else None
+        platform = importlib.import_module(f"pyrender.platforms.{name}")
+        make = platform.EGLPlatform if name == "egl" else platform.OSMesaPlatform
+        self.platform: Any = make(MIN_SIZE, MIN_SIZE)
         self.platform.init_context()
 
     def release(self) -> None:
         """Let the context go, so that another thread may take it."""
-        if self._name == "egl":
-            from OpenGL import EGL
-
-            none = (EGL.EGL_NO_SURFACE, EGL.EGL_NO_SURFACE, EGL.EGL_NO_CONTEXT)
-            EGL.eglMakeCurrent(self.platform._egl_display, *none)
+        egl = self._egl
+        if egl is not None:
+            egl.eglMakeCurrent(self.platform._egl_display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
 
     def drawing(self, width: int, height: int) -> Any:
         """Make a frame buffer with its own programs, which read this package's shaders."""
-        drawing = self._drawing_class(width, height)
+        drawing = self._pyrender.Renderer(width, height)
+        # pyrender would also read the depths back, which takes longer than drawing.
+        drawing._read_main_framebuffer = functools.partial(self._read_colours, drawing)
         drawing._program_cache.shader_dir = str(Path(__file__).parent / "shaders")
         return drawing
+
+    def _read_colours(self, drawing: Any, scene: Any, flags: int) -> NDArray[np.uint8]:
+        """Resolve the multisampled picture and read it, top row first."""
+        gl = self._gl
+        width, height = drawing._main_fb_dims
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, drawing._main_fb_ms)
+        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, drawing._main_fb)
+        gl.glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.GL_COLOR_BUFFER_BIT, gl.GL_LINEAR)
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, drawing._main_fb)
+        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
+        pixels = gl.glReadPixels(0, 0, width, height, gl.GL_RGB, gl.GL_UNSIGNED_BYTE)
+        return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)[::-1].copy()
 
     def vertices(self, rig: Rig, positions: NDArray[Any], normals: NDArray[Any]) -> NDArray[np.float32]:
         """Lay all attributes side by side, as pyrender's vertex buffer has them."""

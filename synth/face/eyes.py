@@ -37,7 +37,9 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
     points = ball * (bulge * face.eye_radius * 0.995)[:, None]
     colour = _ball_colour(angle, turn, palette)
     # The upper lid and its lashes throw a shadow on the ball; the corners are dim.
-    shade = 1.0 - 0.50 * np.clip((ball[:, 1] - 0.10) / 0.35, 0, 1) - 0.35 * np.clip((np.abs(ball[:, 0]) - 0.35) / 0.5, 0, 1)
+    shade = (
+        1.0 - 0.50 * np.clip((ball[:, 1] - 0.10) / 0.35, 0, 1) - 0.35 * np.clip((np.abs(ball[:, 0]) - 0.35) / 0.5, 0, 1)
+    )
     gloss = np.where((angle < IRIS)[:, None], (1.6, 260.0), (0.30, 90.0))
     quads = grid_quads(len(rings), _MERIDIANS)
     still = np.zeros((len(face.morph_names), len(points), 3), dtype=np.float32)
@@ -73,7 +75,7 @@ def lashes(face: FaceModel) -> list[Surface]:
     """Return the lashes: the helper strips, drawn in towards their roots."""
     strips = []
     for side in range(2):
-        for row, length in ((2, 0.36),):
+        for row, length in ((2, 0.42),):
             part = face.parts[f"{'lr'[side]}-eyelashes-{row}"]
             strips.append(_strip(part, face.eye_centres[side], face.eye_radius, length))
     return strips

@@ -22,8 +22,15 @@ _GAP = np.array([0.42, 0.30, 0.26])
 _WIDTHS = (0.088, 0.068, 0.078, 0.070, 0.068, 0.095, 0.090)
 """Widths of the upper teeth from the middle outwards, in dm; the lower row is narrower."""
 _COLUMNS = 7
-_EDGE, _MARGIN, _ROOT = 0, 9, 13
-"""Rows of the grid: the biting edge, the margin of the gum, the end of the gum."""
+"""Columns of the grid on each tooth."""
+_LEVELS = np.array(
+    [
+        *[(0.10, -0.040), (0.00, -0.027), (-0.02, -0.011), (0.03, 0.0), (0.14, 0.005), (0.32, 0.011)],
+        *[(0.52, 0.012), (0.72, 0.009), (0.88, 0.004), (1.00, 0.002), (1.06, 0.009), (1.35, 0.011), (1.80, 0.0)],
+    ]
+)
+"""Rows of the grid: height above the biting edge as a share of the tooth's length, and standing out in dm."""
+_FIRST_GUM_LEVEL = 9
 
 
 @dataclass(frozen=True)
@@ -53,40 +60,38 @@ def teeth(face: FaceModel) -> list[Surface]:
 def _teeth(row: _Row) -> Surface:
     """Build one row as a grid: columns along the arch, rows from behind the biting edge over the gum."""
     widths = np.array(_WIDTHS) * row.scale
-    borders = np.concatenate([[0.0], np.cumsum(widths)])
-    inside = np.linspace(-1, 1, _COLUMNS)
-    along, tooth, within = [], [], []
-    for k in (*range(len(widths) - 1, -1, -1), *range(len(widths))):
-        side = -1.0 if len(along) < len(widths) else 1.0
-        along.append(side * (borders[k] + widths[k] * (0.5 + side * 0.5 * inside)) if side > 0 else -(borders[k] + widths[k] * (0.5 - 0.5 * inside)))
-        tooth.append(np.full(_COLUMNS, k))
-        within.append(inside)
-    s, k, u = np.concatenate(along), np.concatenate(tooth), np.concatenate(within)
-    place, outward = _arch(row, s)
+    middles = np.cumsum(widths) - 0.5 * widths
+    within = np.tile(np.linspace(-1, 1, _COLUMNS), 2 * len(widths))
+    tooth = np.repeat([*range(len(widths))[::-1], *range(len(widths))], _COLUMNS)
+    along = np.repeat([*-middles[::-1], *middles], _COLUMNS) + 0.5 * widths[tooth] * within
+    place, outward = _arch(row, along)
+    length = row.length * np.interp(tooth, [0, 1, 2, 3, 6], [1.0, 0.88, 1.0, 0.86, 0.75])
+    beside = np.abs(within)
 
-    length = row.length * np.interp(k, [0, 1, 2, 3, 6], [1.0, 0.88, 1.0, 0.86, 0.75])
-    corner = np.abs(u) ** 4
-    # Each grid row: height above the edge as a share of the tooth, and how far the surface stands out.
-    levels = [(0.10, -0.045), (0.0, -0.030), (-0.02, -0.012), (0.03, 0.0), (0.14, 0.006), (0.32, 0.012)]
-    levels += [(0.52, 0.013), (0.72, 0.010), (0.88, 0.004), (1.0, 0.002), (1.06, 0.010), (1.35, 0.012), (1.8, 0.0)]
-    points, colours = [], []
-    for j, (share, out) in enumerate(levels):
-        round_edge = 0.10 * corner * (j <= 4)
-        margin = 0.10 * np.abs(u) ** 2.5 * -1.0 * (j >= _MARGIN)
-        height = row.edge + row.up * length * (share + round_edge + margin)
-        groove = 0.014 * np.abs(u) ** 6 * (j < _MARGIN + 1)
-        flat = place + outward * (out * 0.9 - groove)[:, None]
-        points.append(np.column_stack([flat[:, 0], height, flat[:, 1]]))
-        enamel = _ENAMEL + (_GAP - _ENAMEL) * (0.75 * np.abs(u) ** 10)[:, None]
-        colours.append(enamel if j < _MARGIN else np.broadcast_to(_GUM, enamel.shape))
-    vertices = np.concatenate(points)
-    quads = grid_quads(len(levels), len(s), closed=False)
-    if row.up > 0:
-        quads = quads[:, ::-1]
-    dim = 1.0 - 0.72 * np.clip((np.abs(s) - 0.12) / 0.16, 0, 1)
-    shade = np.tile(dim, len(levels)) * np.repeat(np.interp(np.arange(len(levels)), [0, 2, 8, 12], [0.5, 0.95, 0.85, 0.55]), len(s))
-    morphs = _carried(row.part, vertices)
-    return loose_surface(vertices, quads, morphs, np.concatenate(colours), gloss=(0.28, 50.0), shade=shade)
+    share, out = (values[:, None] for values in _LEVELS.T)
+    level = np.arange(len(_LEVELS))[:, None]
+    gum = level >= _FIRST_GUM_LEVEL
+    # Corners of the biting edge are round, teeth are parted by grooves, and the gum reaches down between them.
+    share = share + 0.10 * beside**4 * (level <= 4) - 0.10 * beside**2.5 * gum
+    out = out - 0.014 * beside**6 * (level <= _FIRST_GUM_LEVEL)
+    height = row.edge + row.up * length * share
+    flat = place + outward * out[..., None]
+    vertices = np.stack([flat[..., 0], height, flat[..., 1]], axis=-1).reshape(-1, 3)
+    enamel = _ENAMEL + (_GAP - _ENAMEL) * (0.75 * beside**10)[:, None]
+    colour = np.where(gum[..., None], _GUM, enamel).reshape(-1, 3)
+
+    quads = grid_quads(len(_LEVELS), len(along), closed=False)
+    # Little light reaches the teeth behind the corners of the mouth, and the roots.
+    dim = 1.0 - 0.72 * np.clip((np.abs(along) - 0.12) / 0.16, 0, 1)
+    depth = np.interp(level[:, 0], [0, 2, 8, 12], [0.5, 0.95, 0.85, 0.55])
+    return loose_surface(
+        vertices,
+        quads[:, ::-1] if row.up > 0 else quads,
+        _carried(row.part, vertices),
+        colour,
+        gloss=(0.28, 50.0),
+        shade=np.outer(depth, dim).ravel(),
+    )
 
 
 def _arch(row: _Row, s: Floats) -> tuple[Floats, Floats]:
@@ -104,12 +109,13 @@ def _arch(row: _Row, s: Floats) -> tuple[Floats, Floats]:
     return place, outward / np.linalg.norm(outward, axis=1, keepdims=True)
 
 
-def _carried(part: Part, vertices: Floats) -> NDArray[np.float64]:
+def _carried(part: Part, vertices: Floats) -> Floats:
     """Let new vertices move as the helper's vertices near them do."""
     distance = np.linalg.norm(vertices[:, None] - part.vertices, axis=2)
     weight = 1.0 / (distance**2 + 0.02**2) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
-    return np.einsum("np,mpk->mnk", weight, part.morphs.astype(np.float64))
+    carried: Floats = np.einsum("np,mpk->mnk", weight, part.morphs.astype(np.float64))
+    return carried
 
 
 def tongue(face: FaceModel) -> Surface:

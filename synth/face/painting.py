@@ -55,7 +55,9 @@ def above_hairline(angle: ArrayLike, height: ArrayLike) -> Floats:
 
 def below_neckline(angle: ArrayLike, height: ArrayLike) -> Floats:
     """Return how far a place lies under the shirt, in dm; negative on bare skin."""
-    line = _smooth_line(np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [5.18, 5.30, 5.47, 5.58, 5.60])
+    line = _smooth_line(
+        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [5.18, 5.30, 5.47, 5.58, 5.60]
+    )
     return line - np.asarray(height, dtype=np.float64)
 
 
@@ -67,7 +69,7 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     noise = _Noise(np.random.default_rng(20130607))
 
     picture = _skin(palette, angle, height, noise)
-    picture = _mix(picture, np.multiply(palette.hair, 1.25), 0.93 * _brow(angle, height, noise))
+    picture = _mix(picture, np.multiply(palette.hair, 1.6), 0.85 * _brow(angle, height, noise))
     strands = noise.stretched(rough=(300, 5))
     hair = np.multiply(palette.hair, (1.0 + 0.30 * strands)[..., None])
     inside = above_hairline(angle, height) + 0.022 * noise.stretched(rough=(420, 10))
@@ -93,8 +95,8 @@ def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> F
 def _brow(angle: Floats, height: Floats, noise: "_Noise") -> Floats:
     """Return how much brow hair covers each place: a gentle arch that thins towards its tail."""
     along = (angle - 0.135) / 0.45
-    centre = 7.520 + 0.075 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.050 * np.clip(along, 0, 1.3) ** 2
-    half = 0.040 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
+    centre = 7.525 + 0.055 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
+    half = 0.036 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
     across = np.abs(height - centre) / half
     hairs = noise.slanted(angle, height)
     body = 1.0 - _step(across + 0.16 * hairs, 0.25, 1.35)
@@ -138,17 +140,20 @@ def _smooth_line(x: Floats, knots: list[float], values: list[float]) -> Floats:
     fine = np.linspace(0, np.pi, 400)
     line = np.interp(np.concatenate([-fine[25:0:-1], fine, np.pi + fine[1:26]]), knots, values)
     kernel = np.hanning(53)[1:-1]
-    return np.interp(x, fine, np.convolve(line, kernel / kernel.sum(), mode="valid"))
+    smooth: Floats = np.interp(x, fine, np.convolve(line, kernel / kernel.sum(), mode="valid"))
+    return smooth
 
 
 def _mix(base: Floats, over: ArrayLike, cover: Floats) -> Floats:
-    return base + (np.asarray(over) - base) * np.clip(cover, 0.0, 1.0)[..., None]
+    mixed: Floats = base + (np.asarray(over) - base) * np.clip(cover, 0.0, 1.0)[..., None]
+    return mixed
 
 
 def _spot(angle: Floats, height: Floats, centre: tuple[float, float], radius: tuple[float, float]) -> Floats:
-    return np.exp(-(((angle - centre[0]) / radius[0]) ** 2) - ((height - centre[1]) / radius[1]) ** 2)
+    spot: Floats = np.exp(-(((angle - centre[0]) / radius[0]) ** 2) - ((height - centre[1]) / radius[1]) ** 2)
+    return spot
 
 
 def _step(x: Floats, low: float, high: float) -> Floats:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    t: Floats = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)

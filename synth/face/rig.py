@@ -46,10 +46,7 @@ class Rig:
         self.uv = np.concatenate([surface.uv for surface in surfaces]).astype(np.float32)
         self.gloss = np.concatenate([surface.gloss for surface in surfaces]).astype(np.float32)
         self.paint = np.concatenate(
-            [
-                np.column_stack([s.colour**2 * (s.cover * s.shade)[:, None], (1 - s.cover) * s.shade])
-                for s in surfaces
-            ]
+            [np.column_stack([s.colour**2 * (s.cover * s.shade)[:, None], (1 - s.cover) * s.shade]) for s in surfaces]
         ).astype(np.float32)
         self._rest = rest
         self._quads = quads
@@ -65,7 +62,7 @@ class Rig:
         self._eye_centres = face.eye_centres
 
     def pose(self, weights: ArrayLike, head: ArrayLike, eyes: ArrayLike) -> tuple[Floats, Floats]:
-        """Return positions (N, 3) in dm and unit normals (N, 3); see `synth.render.Renderer.frame` for the arguments."""
+        """Return positions (N, 3) in dm and unit normals (N, 3); the arguments are those of `Renderer.frame`."""
         positions = self._rest + (self._morphs @ np.asarray(weights, dtype=np.float64)).reshape(-1, 3)
         for span, centre, (yaw, pitch) in zip(
             self._eyes, self._eye_centres, np.asarray(eyes, dtype=np.float64), strict=True
@@ -80,7 +77,8 @@ class Rig:
         a, b, c, d = (positions[self._quads[:, k]] for k in range(4))
         normals: Floats = self._around @ _cross(c - a, d - b)
         lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-        return normals / np.maximum(lengths, 1e-12)[:, None]
+        normals /= np.maximum(lengths, 1e-12)[:, None]
+        return normals
 
 
 class _Turns:

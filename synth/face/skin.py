@@ -100,5 +100,5 @@ def _follow(face: FaceModel, vertices: Floats) -> Floats:
 
 
 def _step(x: Floats, low: float, high: float) -> Floats:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    t: Floats = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3 - 2 * t)

@@ -80,9 +80,7 @@ def _vertex_points(
     )
     border_ends = ends[~inner]
     on_border = np.isin(np.arange(n_vertices), border_ends)
-    border_edges = _incidence(
-        border_ends.ravel(), np.repeat(np.flatnonzero(~inner), 2), (n_vertices, len(ends))
-    )
+    border_edges = _incidence(border_ends.ravel(), np.repeat(np.flatnonzero(~inner), 2), (n_vertices, len(ends)))
     along = 0.5 * own + 0.25 * border_edges @ midpoints
     return sparse.csr_array(
         sparse.diags_array((~on_border).astype(float)) @ inside + sparse.diags_array(on_border.astype(float)) @ along
