@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1024, 1024
-_AXIS = 0.4
-"""Depth in dm of the vertical axis that the painting is wrapped round."""
-_LOWEST, _HIGHEST = 4.9, 8.6
-_SLOPE, _NECK_RADIUS = 0.6, 0.7
+_HEAD_AXIS, _NECK_AXIS = 0.4, 0.15
+"""Depth in dm of the vertical axis that the painting is wrapped round, in the head and in the neck."""
+_LOWEST, _HIGHEST = 4.4, 8.6
+_SLOPE, _NECK_RADIUS = 0.8, 0.5
 """The shoulders spread away from the axis: their distance beyond the neck counts as depth below it."""
 
 
@@ -33,9 +33,10 @@ class Palette:
 
 def wrap(template: Floats) -> tuple[Floats, Floats]:
     """Return the angle from the middle of the face (radians, 0 to pi) and the height (dm) of places on the template."""
-    x, y, z = np.abs(template[:, 0]), template[:, 1], template[:, 2] - _AXIS
+    x, y = np.abs(template[:, 0]), template[:, 1]
+    below_jaw = _step(6.3 - y, 0.0, 0.6)
+    z = template[:, 2] - (_HEAD_AXIS + (_NECK_AXIS - _HEAD_AXIS) * below_jaw)
     beyond = np.maximum(0.0, np.hypot(x, z) - _NECK_RADIUS)
-    below_jaw = np.clip((6.3 - y) / 0.5, 0.0, 1.0)
     return np.arctan2(x, z), y - _SLOPE * beyond * below_jaw
 
 
@@ -56,7 +57,7 @@ def above_hairline(angle: ArrayLike, height: ArrayLike) -> Floats:
 def below_neckline(angle: ArrayLike, height: ArrayLike) -> Floats:
     """Return how far a place lies under the shirt, in dm; negative on bare skin."""
     line = _smooth_line(
-        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [5.18, 5.30, 5.47, 5.58, 5.60]
+        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [4.97, 5.06, 5.22, 5.37, 5.40]
     )
     return line - np.asarray(height, dtype=np.float64)
 
@@ -76,8 +77,8 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     picture = _mix(picture, hair, _step(inside, -0.07, 0.06))
     shirt = np.multiply(palette.shirt, (1.0 + 0.03 * noise.stretched(rough=(500, 500)))[..., None])
     under = below_neckline(angle, height)
-    seam = 1.0 - 0.22 * np.exp(-(((under - 0.11) / 0.008) ** 2))
-    picture = _mix(picture, shirt * seam[..., None], _step(under, -0.004, 0.004))
+    band = 1.0 - 0.10 * _step(0.10 - under, -0.006, 0.006) - 0.12 * np.exp(-(((under - 0.10) / 0.010) ** 2))
+    picture = _mix(picture, shirt * band[..., None], _step(under, -0.005, 0.005))
     return np.rint(255 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)
 
 
@@ -95,7 +96,7 @@ def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> F
 def _brow(angle: Floats, height: Floats, noise: "_Noise") -> Floats:
     """Return how much brow hair covers each place: a gentle arch that thins towards its tail."""
     along = (angle - 0.135) / 0.45
-    centre = 7.525 + 0.055 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
+    centre = 7.495 + 0.055 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
     half = 0.036 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
     across = np.abs(height - centre) / half
     hairs = noise.slanted(angle, height)
@@ -126,13 +127,15 @@ class _Noise:
         phase = (angle - lean * (height - 7.5)) * 260.0 + 900.0
         low = np.floor(phase).astype(int)
         part = phase - low
-        return 0.8 * (streaks[low % 4096] * (1 - part) + streaks[(low + 1) % 4096] * part)
+        values: Floats = 0.8 * (streaks[low % 4096] * (1 - part) + streaks[(low + 1) % 4096] * part)
+        return values
 
 
 def _lerp_rows(values: Floats, rows: Floats) -> Floats:
     low = np.floor(rows).astype(int)
     part = (rows - low)[:, None]
-    return values[low] * (1 - part) + values[low + 1] * part
+    between: Floats = values[low] * (1 - part) + values[low + 1] * part
+    return between
 
 
 def _smooth_line(x: Floats, knots: list[float], values: list[float]) -> Floats:
@@ -155,5 +158,6 @@ def _spot(angle: Floats, height: Floats, centre: tuple[float, float], radius: tu
 
 
 def _step(x: Floats, low: float, high: float) -> Floats:
-    t: Floats = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3 - 2 * t)
+    t = np.clip((x - low) / (high - low), 0.0, 1.0)
+    step: Floats = t * t * (3 - 2 * t)
+    return step

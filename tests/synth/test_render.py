@@ -1,0 +1,205 @@
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from synth import render
+from synth.errors import RenderError, SpecError
+from synth.face.mesh import FaceModel
+from synth.render import Renderer
+
+Weights = Callable[..., np.ndarray]
+
+
+@pytest.fixture(scope="module")
+def renderer(face: FaceModel) -> Iterator[Renderer]:
+    with Renderer(face, width=320, height=256) as opened:
+        yield opened
+
+
+def eye_region(frame: np.ndarray) -> np.ndarray:
+    """The image's rows and columns round both eyes."""
+    height, width = frame.shape[:2]
+    return frame[int(0.36 * height) : int(0.47 * height), int(0.36 * width) : int(0.64 * width)].astype(int)
+
+
+def moved(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.abs(a.astype(int) - b.astype(int)).max(axis=2) > 12
+
+
+def centre_of_face(frame: np.ndarray) -> np.ndarray:
+    """Mean column and row of skin-coloured pixels in the upper two thirds."""
+    r, g, b = np.moveaxis(frame[: 2 * len(frame) // 3].astype(int), 2, 0)
+    rows, columns = np.nonzero((r > g + 15) & (g > b))
+    return np.array([columns.mean(), rows.mean()])
+
+
+@pytest.mark.parametrize("size", [(320, 256), (144, 180), (181, 97)])
+def test_frames_have_the_size_asked_for(face: FaceModel, weights: Weights, size: tuple[int, int]) -> None:
+    with Renderer(face, width=size[0], height=size[1]) as renderer:
+        frame = renderer.frame(weights())
+    assert frame.shape == (size[1], size[0], 3)
+    assert frame.dtype == np.uint8
+    assert frame.std() > 20
+
+
+def test_head_is_framed_with_room_around_it(renderer: Renderer, weights: Weights) -> None:
+    frame = renderer.frame(weights())
+    background = np.round(np.array(render.BACKGROUND) * 255)
+    figure = (np.abs(frame - background) > 3).any(axis=2)
+    assert not figure[: len(figure) // 20].any()
+    assert figure[-1].mean() > 0.5
+    assert not figure[: len(figure) // 2, [0, -1]].any()
+
+
+def test_equal_input_gives_equal_frames(renderer: Renderer, face: FaceModel, weights: Weights) -> None:
+    pose = {"head": (0.1, 0.2, -0.1), "eyes": ((0.1, 0.0), (0.1, 0.1))}
+    first = renderer.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose)
+    renderer.frame(weights(browDown=1))
+    assert (renderer.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose) == first).all()
+    with Renderer(face, width=320, height=256) as other:
+        assert (other.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose) == first).all()
+
+
+def test_frames_are_the_callers_own(renderer: Renderer, weights: Weights) -> None:
+    first = renderer.frame(weights())
+    kept = first.copy()
+    renderer.frame(weights(jawOpen=1))
+    assert (first == kept).all()
+
+
+def test_two_renderers_do_not_disturb_each_other(renderer: Renderer, face: FaceModel, weights: Weights) -> None:
+    before = renderer.frame(weights())
+    other = Renderer(face, width=64, height=64)
+    other.frame(weights(jawOpen=1))
+    assert (renderer.frame(weights()) == before).all()
+    other.close()
+    other.close()
+    assert (renderer.frame(weights()) == before).all()
+
+
+def test_another_thread_may_render(renderer: Renderer, weights: Weights) -> None:
+    expected = renderer.frame(weights())
+    found: list[np.ndarray] = []
+    thread = threading.Thread(target=lambda: found.append(renderer.frame(weights())))
+    thread.start()
+    thread.join()
+    assert (found[0] == expected).all()
+    assert (renderer.frame(weights()) == expected).all()
+
+
+def test_blink_covers_the_eyes(renderer: Renderer, weights: Weights) -> None:
+    """No white and no iris is left: between closed lids there is only skin, and the dark line of the lashes."""
+
+    def whites(frame: np.ndarray) -> int:
+        pixels = eye_region(frame)
+        return int(((pixels.min(axis=2) > 140) & (np.ptp(pixels, axis=2) < 28)).sum())
+
+    def turns(**values: float) -> int:
+        there = renderer.frame(weights(**values), eyes=((0.5, 0), (0.5, 0)))
+        back = renderer.frame(weights(**values), eyes=((-0.5, 0), (-0.5, 0)))
+        return int(moved(eye_region(there), eye_region(back)).sum())
+
+    assert whites(renderer.frame(weights())) > 20
+    assert whites(renderer.frame(weights(eyeBlink=1))) == 0
+    assert turns() > 100
+    assert turns(eyeBlink=1) == 0
+
+
+def test_neutral_mouth_is_closed(renderer: Renderer, weights: Weights) -> None:
+    """Teeth and gaps would be pale or near black; closed lips are neither."""
+
+    def teeth(frame: np.ndarray) -> int:
+        height, width = frame.shape[:2]
+        mouth = frame[int(0.56 * height) : int(0.76 * height), int(0.40 * width) : int(0.60 * width)].astype(int)
+        return int(((mouth.min(axis=2) > 120) & (np.ptp(mouth, axis=2) < 45)).sum())
+
+    assert teeth(renderer.frame(weights(mouthUpperUp=1))) > 30
+    for pose in ({}, {"mouthPress": 1.0}, {"mouthFrown": 1.0}, {"mouthSmile": 1.0}, {"mouthPucker": 1.0}):
+        assert teeth(renderer.frame(weights(**pose))) == 0, pose
+
+
+@pytest.mark.parametrize(
+    ("head", "direction"),
+    [((0.3, 0, 0), (0, 1)), ((-0.3, 0, 0), (0, -1)), ((0, 0.3, 0), (1, 0)), ((0, -0.3, 0), (-1, 0))],
+)
+def test_head_turns_the_way_it_is_told(
+    renderer: Renderer, weights: Weights, head: tuple[float, ...], direction: tuple[int, int]
+) -> None:
+    """Down is down, and the subject's left is the right of the picture."""
+    shift = centre_of_face(renderer.frame(weights(), head=head)) - centre_of_face(renderer.frame(weights()))
+    assert shift @ direction > 3
+    assert abs(shift @ direction) > 2 * abs(shift[::-1] @ direction)
+
+
+def test_head_rolls_towards_the_subjects_right(renderer: Renderer, weights: Weights) -> None:
+    """The crown goes to the left of the picture."""
+    frame = renderer.frame(weights(), head=(0, 0, 0.3))
+    dark = np.nonzero(frame[: len(frame) // 4].max(axis=2) < 70)[1]
+    assert dark.mean() < 0.5 * frame.shape[1] - 10
+
+
+def test_shoulders_stay_when_the_head_turns(renderer: Renderer, weights: Weights) -> None:
+    changed = moved(renderer.frame(weights()), renderer.frame(weights(), head=(0.2, 0.35, 0.2)))
+    assert changed[: 3 * len(changed) // 4].any()
+    assert changed[-len(changed) // 16 :].mean() < 0.01
+
+
+@pytest.mark.parametrize(("gaze", "axis", "sign"), [((0.4, 0), 1, 1), ((-0.4, 0), 1, -1), ((0, 0.3), 0, 1)])
+def test_gaze_moves_the_irises(
+    renderer: Renderer, weights: Weights, gaze: tuple[float, float], axis: int, sign: int
+) -> None:
+    def iris(frame: np.ndarray) -> float:
+        region = eye_region(frame)[:, : eye_region(frame).shape[1] // 2]
+        return float(np.argwhere(region.max(axis=2) < 110)[:, axis].mean())
+
+    wide = weights(eyeWide=1)
+    assert sign * (iris(renderer.frame(wide, eyes=(gaze, gaze))) - iris(renderer.frame(wide))) > 0.3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"weights": np.zeros(51)}, "weights"),
+        ({"weights": np.full(52, np.nan)}, "weights"),
+        ({"head": (0, 0)}, "head"),
+        ({"eyes": (0, 0)}, "eyes"),
+    ],
+)
+def test_wrong_arguments_are_named(renderer: Renderer, arguments: dict[str, object], named: str) -> None:
+    with pytest.raises(SpecError, match=named):
+        renderer.frame(**({"weights": np.zeros(52)} | arguments))
+
+
+@pytest.mark.parametrize("size", [{"width": 0}, {"height": 100_000}])
+def test_impossible_sizes_are_refused(face: FaceModel, size: dict[str, int]) -> None:
+    with pytest.raises(SpecError, match=next(iter(size))):
+        Renderer(face, **size)
+
+
+def test_closed_renderer_says_so(face: FaceModel) -> None:
+    renderer = Renderer(face, width=32, height=32)
+    renderer.close()
+    with pytest.raises(RenderError, match="closed"):
+        renderer.frame(np.zeros(52))
+
+
+def test_missing_opengl_names_the_packages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PYOPENGL_PLATFORM", raising=False)
+    monkeypatch.setattr(render, "_loads", lambda *_names: False)
+    with pytest.raises(RenderError, match="apt-get install libegl1 libgl1 libgl1-mesa-dri"):
+        render._choose_platform()
+
+
+def test_a_process_that_forgets_to_close_ends_quietly(face_dir: object) -> None:
+    code = (
+        "import numpy as np, sys; from pathlib import Path;"
+        "from synth.face.mesh import load_face; from synth.render import Renderer;"
+        "r = Renderer(load_face(Path(sys.argv[1])), width=64, height=64); r.frame(np.zeros(52))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(face_dir)], capture_output=True, text=True, check=True)
+    assert done.stdout == ""
+    assert done.stderr == ""

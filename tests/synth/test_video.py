@@ -1,0 +1,122 @@
+from contextlib import closing
+from pathlib import Path
+
+import imageio.v3 as iio
+import imageio_ffmpeg
+import numpy as np
+import pytest
+
+from synth.errors import SpecError, VideoError
+from synth.video import VideoWriter, write_png
+
+
+def moving_bar(k: int, *, width: int = 114, height: int = 90) -> np.ndarray:
+    frame = np.full((height, width, 3), (40, 90, 160), dtype=np.uint8)
+    frame[:, 4 * k : 4 * k + 20] = (220, 180, 60)
+    return frame
+
+
+def write(path: Path, n_frames: int = 12, **options: float) -> Path:
+    with VideoWriter(path, 114, 90, **options) as video:
+        for k in range(n_frames):
+            video.write(moving_bar(k))
+    return path
+
+
+def test_frames_and_size_come_back(tmp_path: Path) -> None:
+    """114 x 90 is no multiple of 16: nothing may be resized."""
+    frames = iio.imread(write(tmp_path / "a.mp4"))
+    assert frames.shape == (12, 90, 114, 3)
+    for k in (0, 11):
+        assert np.abs(frames[k].astype(int) - moving_bar(k)).mean() < 4
+
+
+def test_colours_survive(tmp_path: Path) -> None:
+    with VideoWriter(tmp_path / "a.mp4", 64, 64) as video:
+        for _ in range(5):
+            video.write(np.full((64, 64, 3), (225, 182, 158), dtype=np.uint8))
+    assert np.abs(iio.imread(tmp_path / "a.mp4")[2].astype(int) - (225, 182, 158)).max() <= 3
+
+
+def test_rate_and_format(tmp_path: Path) -> None:
+    with closing(imageio_ffmpeg.read_frames(write(tmp_path / "a.mp4", fps=30))) as reader:
+        found = next(reader)
+    assert found["fps"] == 30
+    assert found["codec"] == "h264"
+    assert found["pix_fmt"].startswith("yuv420p")
+
+
+def test_index_lies_before_the_pictures(tmp_path: Path) -> None:
+    content = write(tmp_path / "a.mp4").read_bytes()
+    assert 0 < content.index(b"moov") < content.index(b"mdat")
+
+
+def test_equal_frames_give_equal_bytes(tmp_path: Path) -> None:
+    first, second = write(tmp_path / "a.mp4"), write(tmp_path / "another name.mp4")
+    assert first.read_bytes() == second.read_bytes()
+    assert write(tmp_path / "c.mp4", 11).read_bytes() != first.read_bytes()
+
+
+def test_nothing_is_there_before_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    with VideoWriter(path, 114, 90) as video:
+        video.write(moving_bar(0))
+        assert not path.exists()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.mp4"]
+
+
+def test_an_exception_leaves_the_old_file_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "a.mp4"
+    path.write_bytes(b"old")
+    with pytest.raises(ZeroDivisionError), VideoWriter(path, 114, 90) as video:
+        video.write(moving_bar(0))
+        raise ZeroDivisionError
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_ffmpegs_failure_is_told(tmp_path: Path) -> None:
+    missing = tmp_path / "no such folder" / "a.mp4"
+    with pytest.raises(VideoError) as error, VideoWriter(missing, 114, 90) as video:
+        for k in range(12):
+            video.write(moving_bar(k))
+    assert str(missing) in str(error.value)
+    assert "No such file or directory" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_video_without_frames_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(VideoError, match="no frames"), VideoWriter(tmp_path / "a.mp4", 114, 90):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("size", [(115, 90), (114, 91), (0, 90)])
+def test_odd_sizes_are_refused(tmp_path: Path, size: tuple[int, int]) -> None:
+    with pytest.raises(SpecError, match="even"):
+        VideoWriter(tmp_path / "a.mp4", *size)
+
+
+@pytest.mark.parametrize("fps", [0, -5, float("nan"), 1000])
+def test_impossible_rates_are_refused(tmp_path: Path, fps: float) -> None:
+    with pytest.raises(SpecError, match="frames per second"):
+        VideoWriter(tmp_path / "a.mp4", 114, 90, fps=fps)
+
+
+def test_a_frame_of_another_shape_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="90, 114, 3"), VideoWriter(tmp_path / "a.mp4", 114, 90) as video:
+        video.write(moving_bar(0, width=112))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_png_comes_back_as_it_was(tmp_path: Path) -> None:
+    write_png(tmp_path / "a.png", moving_bar(3))
+    assert (iio.imread(tmp_path / "a.png") == moving_bar(3)).all()
+    assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
+
+
+def test_png_failures_are_told(tmp_path: Path) -> None:
+    with pytest.raises(VideoError, match="missing"):
+        write_png(tmp_path / "missing" / "a.png", moving_bar(0))
+    with pytest.raises(SpecError):
+        write_png(tmp_path / "a.png", np.zeros((4, 4), dtype=np.uint8))
