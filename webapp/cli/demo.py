@@ -51,9 +51,12 @@ def demo(host: str, port: int, no_serve: bool) -> None:
 def _prepare(database: Database, settings: Settings) -> str | None:
     """Apply and open the demo study once, and make the first account; return its password if it is new."""
     with database.write() as session:
-        if SLUG not in {overview.slug for overview in studies.overviews(session)}:
+        known = {overview.slug: overview for overview in studies.overviews(session)}
+        # Before anybody took part, the demo follows the code: a changed face or study file takes effect.
+        if SLUG not in known or known[SLUG].participants == 0:
             spec, text = read_study_file(Path(SLUG))
             studies.apply(session, spec, text, settings)
+        if SLUG not in known:
             studies.set_state(session, SLUG, StudyState.OPEN)
         if experimenters.any_exists(session):
             return None

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from synth.clip import MODELS, ClipSpec, render_clip, render_still
+from synth.clip import ClipSpec, render_clip, render_still
+from synth.expression.pad_pep import MODEL_NAMES
 from synth.face import assets
 from synth.pad import PAD
 from webapp.cli.context import NEGATIVE_NUMBERS
@@ -50,7 +51,7 @@ def _check_out(out: Path, suffix: str) -> None:
 @click.argument("a", type=float)
 @click.argument("d", type=float)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The picture (PNG).")
-@click.option("--model", type=click.Choice(MODELS), default="table", show_default=True, help="From PAD to expression.")
+@click.option("--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression.")
 @click.option("--identity", default="default", show_default=True, help="Whose face.")
 @click.option("--size", type=SizeType(), default="720x576", show_default=True)
 def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
@@ -70,7 +71,7 @@ def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, 
 @click.option(
     "--face",
     "face_model",
-    type=click.Choice([*MODELS, "neutral"]),
+    type=click.Choice([*MODEL_NAMES, "neutral"]),
     default="table",
     show_default=True,
     help="From PAD to expression; neutral shows none.",

@@ -13,6 +13,7 @@ from evaluation.report import figures, html, tables
 from webapp import locale, security
 from webapp.db import Database
 from webapp.experimenter.login import Account, login_manager
+from webapp.errors import NotFoundError
 from webapp.models import StudyState
 from webapp.services import clips, enrolment, experimenters, exports, results, studies
 
@@ -82,8 +83,8 @@ def study(slug: str) -> str:
             participants=enrolment.participants(db, slug),
             report=report,
             sections=tables.sections(report),
-            figures=list(figures.NAMES),
-            states=list(StudyState),
+            figures=figures.NAMES,
+            caption=figures.caption,
         )
 
 
@@ -108,6 +109,8 @@ def clip_progress(slug: str) -> dict[str, int]:
 @blueprint.get("/<slug>/figures/<name>.svg")
 def figure(slug: str, name: str) -> Response:
     """Draw a figure of the report."""
+    if name not in figures.NAMES:
+        raise NotFoundError(name)
     with _database().read() as db:
         svg = figures.draw(name, results.report(db, slug))
     response = Response(svg, mimetype="image/svg+xml")

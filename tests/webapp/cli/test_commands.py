@@ -65,8 +65,19 @@ def test_a_face_is_a_picture(run: object, tmp_path: Path) -> None:
 def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> None:
     out, lineage = tmp_path / "clip.mp4", tmp_path / "clip.json"
     result = run(
-        "say", "Welcome to Hong Kong.", "--out", str(out), "--mute", "--size", "96x80", "--pad", "-0.4", "0.22", "0.12",
-        "--lineage", str(lineage),
+        "say",
+        "Welcome to Hong Kong.",
+        "--out",
+        str(out),
+        "--mute",
+        "--size",
+        "96x80",
+        "--pad",
+        "-0.4",
+        "0.22",
+        "0.12",
+        "--lineage",
+        str(lineage),
     )
     assert result.exit_code == 0, result.output
     content = out.read_bytes()
@@ -89,8 +100,12 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
     ],
 )
 def test_wrong_input_gives_one_sentence(
-    run: object, database: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...], parts: tuple[str, ...],
+    run: object,
+    database: object,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: tuple[str, ...],
+    parts: tuple[str, ...],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     _fails(run(*arguments), *parts)
