@@ -1,18 +1,39 @@
 """The clip: a short film of an expressive face, as a pure function of its specification."""
 
+import hashlib
 import json
 import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Self
 
+import imageio_ffmpeg
+import numpy as np
+from numpy.typing import NDArray
+
 from synth.errors import SpecError
+from synth.expression.course import Course, blink_track, expression_track
+from synth.expression.pad_pep import MODEL_NAMES, load_model
+from synth.expression.pep_fap import pep_to_fap, translation_digest
+from synth.face.assets import asset_digest
+from synth.face.deformation import solve
+from synth.face.mesh import load_face
 from synth.pad import PAD
+from synth.render import RENDERER_VERSION, Renderer
+from synth.video import VideoWriter, write_png
+
+Floats = NDArray[np.float64]
 
 LANGUAGES = ("en", "zh")
-MODELS = ("table", "linear", "quadratic")
 MAX_TEXT = 1000
+FORMAT = 1
+"""Part of a clip's identity; raise it when clips change though specification, models, face and renderer stay."""
+
+_SECONDS_PER_WORD = 0.35
+_SECONDS_PER_CHARACTER = 0.25
 _IDENTITY = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 
 # Inclusive ranges of the numeric fields; a hold of 0.1 s leaves at least one frame at any frame rate.
@@ -70,7 +91,7 @@ class ClipSpec:
     def __post_init__(self) -> None:
         _check_text(self.text)
         _check_choice("lang", self.lang, LANGUAGES)
-        _check_choice("model", self.model, MODELS)
+        _check_choice("model", self.model, MODEL_NAMES)
         if not isinstance(self.identity, str) or not _IDENTITY.fullmatch(self.identity):
             raise SpecError(
                 f"Clip: identity is {self.identity!r}, but must be 1 to 40 lower-case letters, digits, - and _, "
@@ -105,9 +126,163 @@ class ClipSpec:
             raise SpecError(f"Clip: there is no field {', '.join(unknown)}; the fields are {', '.join(known)}.")
         return cls(**values)
 
+    @property
+    def course(self) -> Course:
+        """When the expression comes; the hold is as long as asked, or longer if the text needs it."""
+        characters = sum("\u3400" <= char <= "\u9fff" for char in self.text)
+        words = len(re.findall(r"[^\W\u3400-\u9fff]+(?:['’-][^\W\u3400-\u9fff]+)*", self.text))
+        spoken_s = _SECONDS_PER_WORD * words + _SECONDS_PER_CHARACTER * characters
+        hold_s = max(self.hold_s, spoken_s)
+        return Course(fps=self.fps, neutral_s=self.neutral_s, onset_s=self.onset_s, hold_s=hold_s)
+
     def canonical(self) -> str:
         """Return the one JSON text of this specification: sorted keys, no spaces, ASCII only."""
         return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+
+
+def clip_digest(spec: ClipSpec, face_dir: Path) -> str:
+    """Return the clip's identity: the SHA-256 (hex) of all that its pictures depend on.
+
+    Parameters
+    ----------
+    spec : ClipSpec
+        The specification.
+    face_dir : Path
+        Folder of the compiled face data.
+
+    Raises
+    ------
+    AssetError
+        If the face data are missing or damaged.
+    """
+    return hashlib.sha256(json.dumps(_digests(spec.model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
+
+
+def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
+    """Render a clip to an MP4 file; equal specifications give equal bytes.
+
+    Parameters
+    ----------
+    spec : ClipSpec
+        The specification.
+    out : Path
+        The file; it appears complete or not at all. Its folder must exist.
+    face_dir : Path
+        Folder of the compiled face data.
+
+    Returns
+    -------
+    dict
+        The lineage as plain JSON values: specification, text, PAD, PEP, FAP targets, seed, digests, versions, frames
+        and duration.
+
+    Raises
+    ------
+    AssetError, RenderError, VideoError
+        If the face data are missing, OpenGL does not start, or the file cannot be written.
+    """
+    face = load_face(face_dir, spec.identity)
+    pep, apex = _apex(spec.pad, spec.model, spec.intensity)
+    motion = solve(np.sum(_tracks(apex, spec.course, spec.seed), axis=0), face)
+    with (
+        Renderer(face, width=spec.width, height=spec.height) as renderer,
+        VideoWriter(out, spec.width, spec.height, fps=spec.fps) as video,
+    ):
+        for weights, head, eyes in zip(motion.weights, motion.head, motion.eyes, strict=True):
+            video.write(renderer.frame(weights, head=head, eyes=eyes))
+    frames = len(motion.weights)
+    return {
+        "digest": clip_digest(spec, face_dir),
+        "spec": spec.to_dict(),
+        "text": spec.text,
+        "seed": spec.seed,
+        "frames": frames,
+        "duration_s": frames / spec.fps,
+        **_lineage(spec.pad, pep, apex, _digests(spec.model, face_dir)),
+    }
+
+
+def render_still(
+    pad: tuple[float, float, float],
+    out: Path,
+    face_dir: Path,
+    *,
+    model: str = "table",
+    identity: str = "default",
+    width: int = 720,
+    height: int = 576,
+    intensity: float = 1.0,
+) -> dict[str, Any]:
+    """Render the apex of an expression to a PNG file.
+
+    Parameters
+    ----------
+    pad : tuple of float
+        Pleasure, arousal, dominance, each in [-1, 1].
+    out : Path
+        The file; it appears complete or not at all. Its folder must exist.
+    face_dir : Path
+        Folder of the compiled face data.
+    model, identity, width, height, intensity
+        As in `ClipSpec`; odd sizes are welcome here.
+
+    Returns
+    -------
+    dict
+        The lineage as plain JSON values.
+
+    Raises
+    ------
+    SpecError
+        If an argument is not valid.
+    AssetError, RenderError, VideoError
+        If the face data are missing, OpenGL does not start, or the file cannot be written.
+    """
+    point = PAD.parse(pad).as_tuple()
+    _check_choice("model", model, MODEL_NAMES)
+    face = load_face(face_dir, identity)
+    pep, apex = _apex(point, model, _real("intensity", intensity, *_REAL_RANGES["intensity"]))
+    motion = solve(apex[None, :], face)
+    with Renderer(face, width=width, height=height) as renderer:
+        picture = renderer.frame(motion.weights[0], head=motion.head[0], eyes=motion.eyes[0])
+    write_png(out, picture)
+    asked = {"model": model, "identity": identity, "width": width, "height": height, "intensity": float(intensity)}
+    return {**asked, **_lineage(point, pep, apex, _digests(model, face_dir))}
+
+
+def _apex(pad: tuple[float, float, float], model: str, intensity: float) -> tuple[Floats, Floats]:
+    """Return the PEPs (9,) at full expression and their FAPs (68,)."""
+    pep = intensity * load_model(model).predict(np.array([pad]))[0]
+    return pep, pep_to_fap(pep[None, :])[0]
+
+
+def _tracks(apex: Floats, course: Course, seed: int) -> list[Floats]:
+    """Return the FAP tracks (T, 68) that add up to the clip."""
+    expression = expression_track(apex, course)
+    return [expression, blink_track(expression, course, np.random.default_rng(seed))]
+
+
+def _digests(model: str, face_dir: Path) -> dict[str, Any]:
+    return {
+        "format": FORMAT,
+        "model": load_model(model).digest,
+        "pep_fap": translation_digest(),
+        "assets": asset_digest(face_dir),
+        "renderer": RENDERER_VERSION,
+    }
+
+
+def _lineage(pad: tuple[float, float, float], pep: Floats, apex: Floats, digests: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "pad": list(pad),
+        "pep": pep.tolist(),
+        "fap": {str(k + 1): value for k, value in enumerate(apex.tolist()) if value},
+        "digests": digests,
+        "versions": {
+            **{name: version(name) for name in ("padlab", "numpy", "pyrender")},
+            "ffmpeg": imageio_ffmpeg.get_ffmpeg_version(),
+        },
+    }
 
 
 def _check_text(text: object) -> None:

@@ -1,0 +1,80 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from synth.expression.pep import peps
+from synth.expression.pep_fap import pep_to_fap, translation_digest
+from synth.fap.table import column, mirrored
+
+values = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9).map(lambda row: np.array([row]))
+
+
+def _fap(pep, value):
+    row = np.zeros((1, 9))
+    row[0, pep - 1] = value
+    return {k + 1: v for k, v in enumerate(pep_to_fap(row)[0]) if v}
+
+
+@pytest.mark.parametrize("pep", peps(), ids=lambda pep: pep.name)
+@pytest.mark.parametrize("value", [-1.0, 1.0])
+def test_a_pep_moves_its_own_faps_and_no_other(pep, value):
+    assert set(_fap(pep.pep, value)) == set(pep.faps)
+
+
+@pytest.mark.parametrize(
+    ("pep", "signs"),
+    [
+        (1, {31: 1, 34: 1, 36: 1}),
+        (2, {37: 1, 38: 1}),
+        # Lids: a positive FAP closes, so the opening PEP has to be negative.
+        (3, {19: -1, 20: -1, 21: -1, 22: -1}),
+        (4, {23: 1, 24: 1}),
+        (5, {25: 1, 26: 1}),
+        # Lips: a positive FAP closes; FAP 3 alone opens.
+        (6, {4: -1, 8: -1, 9: -1, 51: -1, 55: -1, 56: -1}),
+        (7, {3: 1, 5: -1, 10: -1, 11: -1, 52: -1, 57: -1, 58: -1}),
+        (8, {12: 1, 13: 1, 59: 1, 60: 1}),
+        (9, {6: 1, 7: 1, 53: 1, 54: 1}),
+    ],
+)
+def test_signs(pep, signs):
+    up, down = _fap(pep, 1.0), _fap(pep, -1.0)
+    assert {fap: np.sign(up[fap]) for fap in signs} == signs
+    assert {fap: -np.sign(down[fap]) for fap in signs} == signs
+
+
+def test_closed_eyes_are_exactly_closed():
+    # The iris diameter is 1024 units; upper and lower lid share it.
+    closed = _fap(3, -1.0)
+    assert closed[19] + closed[21] == pytest.approx(1024, abs=5)
+
+
+@given(values)
+def test_other_faps_are_fixed_shares_of_the_key(row):
+    # MTAP 2013, Eq. 3.
+    full, some = pep_to_fap(np.ones((1, 9)))[0], pep_to_fap(row)[0]
+    for pep in peps():
+        for fap in pep.faps:
+            share = full[column(fap)] / full[column(pep.key)]
+            assert some[column(fap)] == pytest.approx(share * some[column(pep.key)])
+
+
+@given(values, st.floats(0.0, 2.0))
+def test_a_stronger_expression_is_the_same_expression(row, factor):
+    np.testing.assert_allclose(pep_to_fap(factor * row), factor * pep_to_fap(row), atol=1e-9)
+
+
+@given(values)
+def test_expressions_are_symmetric_but_for_the_gaze(row):
+    row[0, 3] = 0.0
+    faps = pep_to_fap(row)
+    np.testing.assert_allclose(mirrored(faps), faps)
+
+
+def test_neutral_is_all_zero():
+    assert not pep_to_fap(np.zeros((2, 9))).any()
+
+
+def test_the_digest_is_a_digest():
+    assert len(translation_digest()) == 64

@@ -1,0 +1,187 @@
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from synth.errors import SpecError
+from synth.expression.pad_pep import word_table
+from synth.expression.pep_fap import pep_to_fap
+from synth.face.deformation import MAX_WEIGHT, moving_faps, solve
+from synth.face.feature_points import skin_rows
+from synth.face.mesh import load_face
+from synth.fap.table import FAP_COUNT, column, faps, mirrored
+from synth.fap.units import FaceUnits
+
+UP, LEFT = 1, 0
+face_is_the_same = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+symmetric_peps = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9).map(
+    lambda row: np.array([row]) * [1, 1, 1, 0, 1, 1, 1, 1, 1]
+)
+
+
+@pytest.fixture
+def face(face_dir):
+    return load_face(face_dir)
+
+
+@pytest.fixture
+def moved(face):
+    """Return how far feature points go when FAPs take values: {point: displacement in dm}."""
+
+    def move(values, points):
+        motion = solve(values, face)
+        rows = skin_rows(face, points)
+        return dict(zip(points, np.einsum("m,mpx->px", motion.weights[0], face.morphs[:, rows]), strict=True))
+
+    return move
+
+
+def _pep(pep, value=1.0):
+    row = np.zeros((1, 9))
+    row[0, pep - 1] = value
+    return pep_to_fap(row)
+
+
+def _fap(**values):
+    sequence = np.zeros((1, FAP_COUNT))
+    for name, value in values.items():
+        sequence[0, column(int(name.removeprefix("f")))] = value
+    return sequence
+
+
+def _side_swapped(names):
+    def other(name):
+        if name.endswith("Left"):
+            return name.removesuffix("Left") + "Right"
+        return name.removesuffix("Right") + "Left" if name.endswith("Right") else name
+
+    return [names.index(other(name)) for name in names]
+
+
+@pytest.mark.parametrize(
+    ("pep", "point", "axis", "sign"),
+    [
+        (1, "4.3", UP, +1),
+        (1, "4.2", UP, +1),
+        (2, "4.1", LEFT, -1),
+        (2, "4.2", LEFT, +1),
+        (3, "3.1", UP, +1),
+        (3, "3.2", UP, +1),
+        (6, "2.2", UP, +1),
+        (6, "8.6", UP, +1),
+        (7, "2.3", UP, -1),
+        (7, "2.1", UP, -1),
+        (8, "8.3", UP, +1),
+        (8, "8.4", UP, +1),
+        (9, "8.3", LEFT, +1),
+        (9, "8.4", LEFT, -1),
+    ],
+)
+def test_a_pep_moves_its_points_the_right_way_and_back(moved, pep, point, axis, sign):
+    there, back = moved(_pep(pep, 1.0), [point])[point][axis], moved(_pep(pep, -1.0), [point])[point][axis]
+    assert sign * there > 0.01
+    # Brows cannot be drawn apart by any morph, and a jaw that is closed cannot rise.
+    assert sign * back < (1e-3 if (pep, point) in {(2, "4.1"), (2, "4.2"), (7, "2.1")} else -0.005)
+
+
+def test_open_eyes_have_a_wider_gap_and_closed_eyes_none(moved, face):
+    gap = FaceUnits.measure(face).IRISD
+
+    def change(value):
+        d = moved(_pep(3, value), ["3.1", "3.3"])
+        return d["3.1"][UP] - d["3.3"][UP]
+
+    assert change(1.0) > 0.3 * gap
+    assert change(-1.0) == pytest.approx(-gap, rel=0.03)
+
+
+@pytest.mark.parametrize("fap", [12, 31, 19, 53, 51, 5])
+def test_a_point_goes_as_far_as_its_fap_says(moved, face, fap):
+    # Both sides together, at a value well inside the morphs' reach; inner and outer lip together, as lips are.
+    value = {5: -500.0, 51: -150.0, 53: 80.0}.get(fap, 100.0)
+    entry = faps()[fap]
+    group = {n for n in (fap, entry.mirror, entry.twin) if n}
+    group |= {faps()[n].twin for n in group if faps()[n].twin}
+    sequence = _fap(**{f"f{n}": value for n in group})
+    displacement = moved(sequence, list(entry.points))[entry.points[0]] @ np.array(entry.direction)
+    wanted = value * FaceUnits.measure(face).steps()[column(fap)]
+    assert displacement == pytest.approx(wanted, rel=0.25)
+
+
+def test_an_open_jaw_alone_leaves_the_lips_closed(moved):
+    d = moved(_fap(f3=600.0), ["2.1", "2.2", "2.3"])
+    assert d["2.1"][UP] < -0.03
+    assert d["2.2"][UP] - d["2.3"][UP] < 0.3 * -d["2.1"][UP]
+
+
+def test_a_brow_leaves_the_mouth_alone(moved):
+    d = moved(_pep(1), ["8.3", "8.2", "2.1"])
+    assert max(np.linalg.norm(v) for v in d.values()) < 0.01
+
+
+@face_is_the_same
+@given(pep=symmetric_peps)
+def test_symmetric_expressions_have_symmetric_weights(face, pep):
+    weights = solve(pep_to_fap(pep), face).weights
+    np.testing.assert_allclose(weights, weights[:, _side_swapped(list(face.morph_names))], atol=2e-3)
+
+
+@face_is_the_same
+@given(seed=st.integers(0, 1000))
+def test_the_mirrored_face_has_mirrored_weights(face, seed):
+    values = np.zeros((1, FAP_COUNT))
+    rng = np.random.default_rng(seed)
+    for fap in moving_faps():
+        values[0, column(fap.fap)] = rng.uniform(-100, 100)
+    here, there = solve(values, face), solve(mirrored(values), face)
+    np.testing.assert_allclose(there.weights, here.weights[:, _side_swapped(list(face.morph_names))], atol=5e-3)
+
+
+def test_weights_are_within_bounds(face):
+    _, _, pep = word_table()
+    weights = solve(1.5 * pep_to_fap(pep), face).weights
+    assert weights.shape == (14, 52)
+    assert weights.min() >= 0.0
+    assert weights.max() <= MAX_WEIGHT
+    assert weights[:, face.morph_names.index("jawOpen")].max() <= 1.0
+
+
+def test_neutral_is_still(face):
+    motion = solve(np.zeros((3, FAP_COUNT)), face)
+    assert not motion.weights.any()
+    assert not motion.head.any()
+    assert not motion.eyes.any()
+
+
+def test_an_expression_grows_along_a_straight_line(face):
+    faint = solve(0.2 * _pep(8, 0.5), face).weights
+    np.testing.assert_allclose(solve(0.4 * _pep(8, 0.5), face).weights, 2 * faint, atol=2e-3)
+
+
+def test_frames_do_not_depend_on_each_other(face):
+    _, _, pep = word_table()
+    together = solve(pep_to_fap(pep), face).weights
+    alone = np.vstack([solve(pep_to_fap(row[None]), face).weights for row in pep])
+    np.testing.assert_allclose(together, alone, atol=1e-6)
+
+
+def test_head_angles(face):
+    # ISO/IEC 14496-2: pitch positive down, yaw positive to the subject's left, roll positive to the subject's right.
+    motion = solve(_fap(f48=10_000, f49=20_000, f50=-5_000), face)
+    np.testing.assert_allclose(motion.head, [[0.1, 0.2, -0.05]])
+    assert not motion.weights.any()
+
+
+def test_eye_angles_and_lids_that_follow(face):
+    motion = solve(_fap(f23=10_000, f24=12_000, f25=20_000, f26=20_000), face)
+    np.testing.assert_allclose(motion.eyes, [[[0.1, 0.2], [0.12, 0.2]]])
+    weight = dict(zip(face.morph_names, motion.weights[0], strict=True))
+    assert weight["eyeLookDownLeft"] == weight["eyeLookDownRight"] > 0.2
+    assert weight["eyeLookOutLeft"] > 0.0
+    assert weight["eyeLookInRight"] > 0.0
+    assert weight["eyeLookInLeft"] == weight["eyeLookUpLeft"] == weight["eyeLookOutRight"] == 0.0
+
+
+def test_sequences_are_checked(face):
+    with pytest.raises(SpecError, match=r"\(frames, 68\)"):
+        solve(np.zeros(68), face)
