@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.eyes import eyeballs, lashes
+from synth.face.hair import bob
 from synth.face.mesh import FaceModel
 from synth.face.mouth import teeth, tongue
 from synth.face.painting import Palette, paint
@@ -14,5 +15,6 @@ from synth.face.surface import Surface
 def dress(face: FaceModel, palette: Palette | None = None) -> tuple[list[Surface], NDArray[np.uint8]]:
     """Return the surfaces of the figure, the left and the right eyeball last, and the painting they refer to."""
     colours = palette if palette is not None else Palette()
-    surfaces = [skin(face, colours), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
+    bust = skin(face, colours)
+    surfaces = [bust, bob(face, bust), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
     return surfaces, paint(colours)

@@ -24,7 +24,7 @@ MAX_WEIGHT = 1.5
 _LIMIT_OF = {
     **dict.fromkeys(("eyeBlinkLeft", "eyeBlinkRight", "cheekSquintLeft", "cheekSquintRight"), 1.0),
     **dict.fromkeys(("jawOpen", "mouthClose", "mouthRollLower", "mouthRollUpper"), 1.0),
-    **dict.fromkeys(("mouthSmileLeft", "mouthSmileRight"), 1.15),
+    **dict.fromkeys(("mouthSmileLeft", "mouthSmileRight"), 1.0),
 }
 
 # Gaze moves the eyeballs themselves; these morphs only let the lids follow.
@@ -44,7 +44,7 @@ _REGION_OF_GROUP = {2: "mouth", 8: "mouth", 3: "eyes", 4: "brows", 5: "cheeks", 
 # A smile lifts the cheeks (AU 6 comes with AU 12), which no PEP can say. Where the cheek's FAP is 0, its point is asked
 # to go up with the corner of the mouth: cheek FAP, corner FAP, share of the corner's distance.
 _LIFTED_CHEEKS = ((41, 12), (42, 13))
-_LIFT = 0.5
+_LIFT = 0.6
 _LIFT_COUNT = 0.4
 
 # How wide the lips part is seen before all else, so the gaps between inner upper and lower lip points are rows of
@@ -57,8 +57,8 @@ _GAP_COUNT = 1.5
 _COST = 0.004
 _COST_OF = {
     **dict.fromkeys(("mouthLeft", "mouthRight", "jawLeft", "jawRight"), 0.06),
-    **dict.fromkeys(("cheekPuff", "jawForward", "mouthFunnel", "mouthRollUpper", "mouthRollLower"), 0.03),
-    **dict.fromkeys(("mouthPucker", "mouthPressLeft", "mouthPressRight"), 0.02),
+    **dict.fromkeys(("cheekPuff", "jawForward", "mouthFunnel", "mouthRollUpper"), 0.03),
+    **dict.fromkeys(("mouthPucker", "mouthRollLower"), 0.015),
     **dict.fromkeys(("mouthLowerDownLeft", "mouthLowerDownRight"), 0.008),
 }
 

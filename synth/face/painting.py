@@ -4,6 +4,7 @@ Places on it depend on the template only, so that one painting fits each identit
 the picture covers half the head, from the middle of the face (left border) to the middle of the nape (right border).
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ WIDTH, HEIGHT = 1024, 1024
 _HEAD_AXIS, _NECK_AXIS = 0.4, 0.15
 """Depth in dm of the vertical axis that the painting is wrapped round, in the head and in the neck."""
 _LOWEST, _HIGHEST = 4.4, 8.6
+_ALL_HAIR = (8.2, 8.55)
+"""Heights in dm between which the painting shows hair at each angle."""
 _SLOPE, _NECK_RADIUS = 0.8, 0.5
 """The shoulders spread away from the axis: their distance beyond the neck counts as depth below it."""
 
@@ -46,6 +49,12 @@ def place(template: Floats) -> Floats:
     return np.column_stack([angle / np.pi, (height - _LOWEST) / (_HIGHEST - _LOWEST)])
 
 
+def place_strand(across: Floats, along: Floats) -> Floats:
+    """Return texture coordinates (N, 2) within the painted hair: across the strands 0 to 1, along them 0 to 1."""
+    lowest, highest = ((height - _LOWEST) / (_HIGHEST - _LOWEST) for height in _ALL_HAIR)
+    return np.column_stack([across, highest + (lowest - highest) * along])
+
+
 def above_hairline(angle: ArrayLike, height: ArrayLike) -> Floats:
     """Return how far a place lies inside the hair, in dm; negative on bare skin."""
     line_angle = [0.0, 0.25, 0.45, 0.62, 0.76, 0.88, 1.02, 1.16, 1.30, 1.50, 1.75, 2.1, np.pi]
@@ -62,8 +71,9 @@ def below_neckline(angle: ArrayLike, height: ArrayLike) -> Floats:
     return line - np.asarray(height, dtype=np.float64)
 
 
+@functools.cache
 def paint(palette: Palette) -> NDArray[np.uint8]:
-    """Return the picture (HEIGHT, WIDTH, 3), top row first."""
+    """Return the picture (HEIGHT, WIDTH, 3), top row first; painted once for each palette, not to be written to."""
     columns = (np.arange(WIDTH) + 0.5) / WIDTH * np.pi
     rows = _HIGHEST - (np.arange(HEIGHT) + 0.5) / HEIGHT * (_HIGHEST - _LOWEST)
     angle, height = np.meshgrid(columns, rows)
@@ -79,7 +89,9 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     under = below_neckline(angle, height)
     band = 1.0 - 0.10 * _step(0.10 - under, -0.006, 0.006) - 0.12 * np.exp(-(((under - 0.10) / 0.010) ** 2))
     picture = _mix(picture, shirt * band[..., None], _step(under, -0.005, 0.005))
-    return np.rint(255 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)
+    result = np.rint(255 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)
+    result.setflags(write=False)
+    return result
 
 
 def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> Floats:

@@ -42,7 +42,8 @@ class Rig:
         morphs = np.concatenate([surface.morphs for surface in surfaces], axis=1, dtype=np.float32)
 
         self.rest = rest.astype(np.float32)
-        self.triangles = quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.uint32)
+        drawn = np.concatenate([surface.drawn for surface in surfaces])
+        self.triangles = quads[drawn][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.uint32)
         self.uv = np.concatenate([surface.uv for surface in surfaces]).astype(np.float32)
         self.gloss = np.concatenate([surface.gloss for surface in surfaces]).astype(np.float32)
         self.paint = np.concatenate(

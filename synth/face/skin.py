@@ -37,6 +37,8 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         right += (1 - side) * seal
     angle, height = wrap(template)
     hair = _step(above_hairline(angle, height), 0.0, 0.35) * (1 - _step(ears, 0.0, 0.3))
+    # The sheet of hair hides the scalp, but for the parting and a margin along the hairline.
+    covered = (hair > 0.9) & (np.abs(template[:, 0]) > 0.25) & (template[:, 1] > 7.3)
     shirt = _step(below_neckline(angle, height), -0.01, 0.05)
 
     shade = 0.28 + 0.72 * np.clip(openness(vertices, quads) / 0.92, 0, 1) ** 1.1
@@ -62,6 +64,7 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         shade=shade,
         gloss=gloss,
         follow=_follow(face, vertices),
+        drawn=~covered[quads].all(axis=1),
     )
 
 

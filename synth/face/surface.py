@@ -32,6 +32,8 @@ class Surface:
         Strength and exponent of the highlight.
     follow : (N, 2) float64
         How much the place follows the neck's and the head's share of the head's rotation, 0 to 1.
+    drawn : (Q,) bool
+        Which quads are drawn; the others are always hidden and only shape the normals.
     """
 
     vertices: Floats
@@ -43,6 +45,7 @@ class Surface:
     shade: Floats
     gloss: Floats
     follow: Floats
+    drawn: NDArray[np.bool_]
 
 
 def loose_surface(
@@ -66,4 +69,5 @@ def loose_surface(
         shade=np.ones(n) if shade is None else shade,
         gloss=np.broadcast_to(gloss, (n, 2)),
         follow=np.ones((n, 2)),
+        drawn=np.ones(len(quads), dtype=bool),
     )

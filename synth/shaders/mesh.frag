@@ -42,5 +42,10 @@ void main()
     float fill = pow(max(0.0, dot(n, normalize(FILL + eye))), gloss.y);
     float edge = 1.0 - max(0.0, dot(n, eye));
     vec3 shine = gloss.x * (key * KEY_COLOUR + fill * FILL_COLOUR + 0.25 * edge * edge * edge * edge);
+    if (!gl_FrontFacing) {
+        // Only the sheet of hair shows its inner side, where little light comes.
+        light *= 0.35;
+        shine *= 0.0;
+    }
     frag_color = vec4(sqrt(min(albedo * light * 0.80 + shine, vec3(1.0))), 1.0);
 }
