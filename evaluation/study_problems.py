@@ -32,12 +32,15 @@ def problems_of(error: ValidationError, located: Located, model: type[BaseModel]
     list of Problem
         At least one.
     """
-    problems: dict[Problem, None] = {}
-    for details in error.errors(include_url=False):
-        path = _existing_path(details["loc"])
-        problem = Problem(located.line(path), field_name(path), _message(details, path, model))
-        problems[problem] = None
-    return sorted(problems, key=lambda problem: problem.line or 0)
+    found = [(details, _existing_path(details["loc"])) for details in error.errors(include_url=False)]
+    # A field that is misspelt is also missing under its right name; the first says enough.
+    meant = {(*path[:-1], _near(path, model)) for details, path in found if details["type"] == "extra_forbidden"}
+    problems = [
+        Problem(located.line(path), field_name(path), _message(details, path, model))
+        for details, path in found
+        if not (details["type"] == "missing" and path in meant)
+    ]
+    return sorted(dict.fromkeys(problems), key=lambda problem: problem.line or 0)
 
 
 def _existing_path(loc: Path) -> Path:
@@ -55,16 +58,24 @@ def _message(details: ErrorDetails, path: Path, model: type[BaseModel]) -> str:
         return _unknown_field(path, model)
     if kind == "model_type":
         return f"{_shown(details['input'])} is not a mapping of fields."
-    reason = _SUBJECT.sub("must", details["msg"]) if kind != "string_pattern_mismatch" else "is not valid"
+    plain = {"dict_type": "is not a mapping", "string_pattern_mismatch": "is not valid"}
+    reason = plain.get(kind) or _SUBJECT.sub("must", details["msg"])
     return f"{_shown(details['input'])} {reason}{_right(_description(model, path))}."
 
 
 def _unknown_field(path: Path, model: type[BaseModel]) -> str:
+    near = _near(path, model)
+    hint = f" (did you mean {near}?)" if near else ""
+    return f"there is no such field{hint}; the fields here are {', '.join(_fields_beside(path, model))}."
+
+
+def _near(path: Path, model: type[BaseModel]) -> str:
+    return next(iter(difflib.get_close_matches(str(path[-1]), _fields_beside(path, model), n=1)), "")
+
+
+def _fields_beside(path: Path, model: type[BaseModel]) -> list[str]:
     parent = _model_at(model, path[:-1])
-    fields = list(parent.model_fields) if parent else []
-    near = difflib.get_close_matches(str(path[-1]), fields, n=1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
-    return f"there is no such field{hint}; the fields here are {', '.join(fields)}."
+    return list(parent.model_fields) if parent else []
 
 
 def _shown(value: object) -> str:

@@ -2,6 +2,7 @@
 
 import io
 import re
+import textwrap
 from collections.abc import Callable
 from threading import Lock
 from types import MappingProxyType
@@ -11,6 +12,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from evaluation.errors import EvaluationError
 from evaluation.instruments.mos import MOS5
@@ -27,13 +29,14 @@ _SHAPES = ("o", "s", "^", "D", "v", "P")
 _INK, _SOFT, _GRID = "#222222", "#6b6b6b", "#e3e3e3"
 
 # Text stays text, so that it can be read aloud, searched and shown in the reader's fonts; fixed ids make the drawing
-# of the same data the same file.
+# of the same data the same file; a dollar sign in a label is a dollar sign.
 _SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "padlab",
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Noto Sans", "sans-serif"],
     "axes.unicode_minus": True,
+    "text.parse_math": False,
 }
 _drawing = Lock()
 
@@ -95,22 +98,30 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     ----------
     Jia et al. (2013), Table 8, drawn.
     """
-    figure = Figure(figsize=(12.6, 4.9), layout="constrained")
+    figure = Figure(figsize=(11, 4.5), layout="constrained")
     panels = figure.subplots(1, 3)
     limit = _pad_limit(report)
     pooled = {found.dimension: found for found in report.reverse_evaluation if found.condition is None}
     for axes, dimension in zip(panels, DIMENSIONS, strict=True):
         _prepare(axes)
-        axes.axhline(0, color=_GRID, linewidth=1, zorder=0)
-        axes.axvline(0, color=_GRID, linewidth=1, zorder=0)
-        axes.plot([-limit, limit], [-limit, limit], color=_SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
         axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
+        axes.xaxis.set_major_locator(MaxNLocator(5))
+        axes.yaxis.set_major_locator(MaxNLocator(5))
         axes.set_xlabel(f"Input {dimension}", color=_INK)
         axes.set_ylabel(f"Evaluated {dimension}", color=_INK)
         _draw_dimension(axes, report, pooled[dimension], limit)
     handles, names = panels[0].get_legend_handles_labels()
     if handles:
         figure.legend(handles, names, loc="outside lower center", ncols=len(handles), frameon=False, fontsize=9)
+    # The names can be placed only when the layout has settled where each point is.
+    figure.draw_without_rendering()
+    means = report.pad_by_stimulus
+    words = [_drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
+    for axes, dimension in zip(panels, DIMENSIONS, strict=True):
+        xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)
+        known = ~np.isnan(xs)
+        shown = [word for word, is_known in zip(words, known, strict=True) if is_known]
+        place_labels(axes, xs[known], ys[known], shown, color=_INK, size=7)
     return figure
 
 
@@ -145,7 +156,7 @@ def mos(report: StudyReport) -> Figure:
         if isinstance(found.result, OpinionScore):
             _draw_opinion(axes, place, found.result, colour, shape)
         else:
-            axes.text(place, 3, "no ratings\nyet", ha="center", va="center", color=_SOFT, fontsize=9)
+            axes.text(place, 3.5, "no ratings\nyet", ha="center", va="center", color=_SOFT, fontsize=9)
     names = [_drawable(label(report.spec.condition(c.name).label), c.name) for c in report.spec.conditions]
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.6, len(names) - 0.4)
@@ -177,6 +188,9 @@ NAMES = tuple(_FIGURES)
 
 def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, limit: float) -> None:
     dimension = found.dimension
+    axes.axhline(0, color=_GRID, linewidth=1, zorder=0)
+    axes.axvline(0, color=_GRID, linewidth=1, zorder=0)
+    axes.plot([-limit, limit], [-limit, limit], color=_SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
     for place, condition in enumerate(report.spec.conditions):
         cells = report.pad_by_cell[report.pad_by_cell["condition"] == condition.name]
         if len(report.spec.conditions) > 1 and len(cells):
@@ -194,17 +208,18 @@ def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, l
             )
     means = report.pad_by_stimulus
     xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)
+    if len(xs):
+        axes.plot(xs, ys, linestyle="", marker="o", markersize=5, color=_INK, label="All conditions", zorder=4)
     name = _NAMES_OF_DIMENSIONS[dimension]
     if isinstance(found.result, Unavailable):
         axes.set_title(name, color=_INK, fontsize=12)
-        axes.text(0, limit * 0.5, _wrapped(found.result.reason), ha="center", va="center", color=_SOFT, fontsize=9)
+        box = {"facecolor": "white", "edgecolor": "none"}
+        reason = textwrap.fill(found.result.reason, 30)
+        axes.text(0, limit * 0.5, reason, ha="center", va="center", color=_SOFT, fontsize=9, bbox=box)
         return
     axes.set_title(f"{name}: r = {wording.share(found.result.r)}", color=_INK, fontsize=12)
-    ends = np.array([xs.min(), xs.max()])
+    ends = np.array([np.nanmin(xs), np.nanmax(xs)])
     axes.plot(ends, found.result.intercept + found.result.slope * ends, color=_INK, linewidth=1.4, zorder=3)
-    axes.plot(xs, ys, linestyle="", marker="o", markersize=5, color=_INK, label="All conditions", zorder=4)
-    words = [_drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
-    place_labels(axes, xs, ys, words, color=_INK, size=7.5)
 
 
 def _draw_opinion(axes: Axes, place: int, found: OpinionScore, colour: str, shape: str) -> None:
@@ -241,10 +256,6 @@ def _pad_limit(report: StudyReport) -> float:
 def _drawable(text: str, otherwise: str) -> str:
     # matplotlib's own font measures the text, and it has no Chinese characters.
     return text if all(ord(character) < 0x0500 for character in text) else otherwise
-
-
-def _wrapped(text: str) -> str:
-    return re.sub(r"(.{20,34}) ", r"\1\n", text)
 
 
 def _with_own_ids(svg: str, name: str) -> str:

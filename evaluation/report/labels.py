@@ -57,7 +57,7 @@ def place_labels(axes: Axes, xs: FloatArray, ys: FloatArray, names: Sequence[str
             color=color,
             fontsize=size,
             zorder=5,
-        )
+        ).set_in_layout(False)
 
 
 def _box(centre: FloatArray, place: tuple[int, int], gap: float, width: float, height: float) -> _Box:

@@ -153,10 +153,13 @@ def _reverse_evaluation(report: StudyReport) -> Section:
                 published,
             )
         )
+    title = "Reverse evaluation: input against evaluated PAD"
     header = ("Condition", "Dimension", "n", "r", "95% CI", "p", "Slope", "Intercept", "r in MTAP 2013")
+    if len(reasons) == len(rows):
+        return Section("reverse_evaluation", title, header, 2, (), tuple(dict.fromkeys(reasons)))
     return Section(
         "reverse_evaluation",
-        "Reverse evaluation: input against evaluated PAD",
+        title,
         header,
         2,
         tuple(rows),
@@ -195,14 +198,12 @@ def _mos_by_condition(report: StudyReport) -> Section:
         sd = _NOTHING if result.sd is None else wording.number(result.sd)
         ci = _NOTHING if result.ci is None else f"{wording.number(result.ci[0])} to {wording.number(result.ci[1])}"
         rows.append((name, str(result.n), wording.number(result.mean), sd, ci))
-    return Section(
-        "mos_by_condition",
-        "Mean opinion score of each condition",
-        ("Condition", "Ratings", "MOS", "SD", "95% CI"),
-        1,
-        tuple(rows),
-        (MOS_UNIT, *dict.fromkeys(reasons)),
-    )
+    title = "Mean opinion score of each condition"
+    header = ("Condition", "Ratings", "MOS", "SD", "95% CI")
+    because = tuple(dict.fromkeys(reasons))
+    if len(reasons) == len(rows):
+        return Section("mos_by_condition", title, header, 1, (), because)
+    return Section("mos_by_condition", title, header, 1, tuple(rows), (MOS_UNIT, *because))
 
 
 def _mos_anova(report: StudyReport) -> Section:

@@ -1,0 +1,69 @@
+from html.parser import HTMLParser
+
+import pandas as pd
+from markupsafe import escape
+
+from evaluation.report import html
+from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
+
+EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
+VOID = {"meta", "link", "br", "img", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Collects tags, addresses and ids, and checks that what is opened is closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.addresses: list[str] = []
+        self.ids: list[str] = []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in {"src", "href", "xlink:href"}]
+        self.ids += [value for name, value in attrs if name == "id"]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in {"src", "href", "xlink:href"}]
+        self.ids += [value for name, value in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_the_page_is_whole_and_needs_nothing_from_elsewhere(report):
+    page = Page(html.render(report))
+    assert page.tags.count("svg") == 2
+    assert not {"script", "link", "iframe", "img"} & set(page.tags)
+    assert all(address.startswith("#") for address in page.addresses)
+    assert len(page.ids) == len(set(page.ids))
+
+
+def test_it_says_what_the_report_says(report):
+    text = html.render(report)
+    assert escape(report.mos_anova.summary()) in text
+    assert "30 participants" in text
+
+
+def test_the_same_report_gives_the_same_page(report):
+    assert html.render(report) == html.render(report)
+
+
+def test_without_answers(demo):
+    text = html.render(analyse(demo, EMPTY))
+    Page(text)
+    assert "There are no answers yet." in text
+
+
+def test_texts_of_the_study_are_escaped(demo, answers):
+    spec = demo.model_copy(update={"title": {"en": "<script>alert(1)</script>", "zh": "x"}})
+    text = html.render(analyse(spec, answers))
+    assert "<script" not in text
+    assert "&lt;script&gt;alert(1)" in text
