@@ -25,6 +25,11 @@ Floats = NDArray[np.float64]
 FORMAT = 1
 """Version of the models' arithmetic; raise it when the same training set predicts otherwise."""
 
+_REACH = 1.3
+"""Where the table's trend levels off, as a multiple of its largest P, A and D."""
+
+_RIDGE = 0.3
+
 
 class PadPepModel(Protocol):
     """What every PAD to PEP model offers."""
@@ -101,9 +106,10 @@ class QuadraticModel:
 class TableModel:
     """A table of expressions, exact at its rows and at neutral, smooth between and beyond.
 
-    A linear trend through neutral carries the expression outward; what the rows have beyond the trend is shared out by
-    inverse distance (Shepard's method), whose weights are positive and sum to 1. So a blend stays between its
-    neighbours, where a polynomial or spline through rows as near to each other as Sad and Anxious would overshoot.
+    A trend through neutral, which levels off beyond the outermost rows, carries the expression outward; what the rows
+    have beyond the trend is shared out by inverse distance (Shepard's method), whose weights are positive and sum to
+    1. So a blend stays between its neighbours, where a polynomial or spline through rows as near to each other as Sad
+    and Anxious would overshoot.
 
     Attributes
     ----------
@@ -118,6 +124,7 @@ class TableModel:
     pad: Floats
     pep: Floats
     digest: str
+    _reach: Floats = field(repr=False)
     _trend: Floats = field(repr=False)
 
     @classmethod
@@ -129,9 +136,16 @@ class TableModel:
             raise SpecError(
                 "PAD to PEP: two rows of the table have the same PAD, or one is (0, 0, 0), which is neutral."
             )
-        trend = _least_squares(pad, pep)
+        reach = _REACH * np.maximum(np.abs(pad).max(axis=0), 1e-6)
+        # Rows of the ridge: slopes that the table does not insist on would exaggerate faces far from its words.
+        ridge = np.sqrt(_RIDGE) * np.eye(3)
+        trend = _least_squares(np.vstack([_levelled(pad, reach), ridge]), np.vstack([pep, np.zeros((3, PEP_COUNT))]))
         return cls(
-            pad=nodes, pep=np.vstack([np.zeros(PEP_COUNT), pep]), digest=_digest("table", pad, pep), _trend=trend
+            pad=nodes,
+            pep=np.vstack([np.zeros(PEP_COUNT), pep]),
+            digest=_digest("table", pad, pep),
+            _reach=reach,
+            _trend=trend,
         )
 
     def predict(self, pad: NDArray[np.floating] | Floats) -> Floats:
@@ -142,9 +156,9 @@ class TableModel:
         # the tiny addend stands for a distance of 1e-6, below which a point is its node.
         weights = 1.0 / (squares**2 + 1e-24)
         weights /= weights.sum(axis=1, keepdims=True)
-        beyond = self.pep - self.pad @ self._trend
+        beyond = self.pep - _levelled(self.pad, self._reach) @ self._trend
         # Sums of many terms end in noise around 1e-17; rounding makes neutral exactly zero.
-        return _bounded(np.round(points @ self._trend + weights @ beyond, 12))
+        return _bounded(np.round(_levelled(points, self._reach) @ self._trend + weights @ beyond, 12))
 
 
 @cache
@@ -186,6 +200,11 @@ def load_model(name: str) -> PadPepModel:
     if name not in _BUILT_IN:
         raise SpecError(f"There is no PAD to PEP model {name!r}; there are {', '.join(MODEL_NAMES)}.")
     return _BUILT_IN[name]()
+
+
+def _levelled(pad: Floats, reach: Floats) -> Floats:
+    """Return PAD values that follow the given ones near neutral and level off at ``reach`` (3,)."""
+    return np.asarray(reach * np.tanh(pad / reach), dtype=np.float64)
 
 
 def _least_squares(terms: Floats, values: Floats) -> Floats:

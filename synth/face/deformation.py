@@ -17,11 +17,14 @@ from synth.fap.units import ANGLE_UNIT, FaceUnits
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-MAX_WEIGHT = 1.5
-"""Largest weight of a morph: the morphs at 1 look weak on video, and bear half as much again."""
+MAX_WEIGHT = 2.0
+"""Largest weight of any morph."""
 
-# Beyond these weights lids cross, jaws unhinge and cheeks crease like paper.
+# At 1 the morphs look weak on video, and most bear half as much again; the inner brow bears twice as much. Beyond the
+# lower limits lids cross, jaws unhinge and cheeks crease like paper.
+_LIMIT = 1.5
 _LIMIT_OF = {
+    "browInnerUp": MAX_WEIGHT,
     **dict.fromkeys(("eyeBlinkLeft", "eyeBlinkRight", "cheekSquintLeft", "cheekSquintRight"), 1.0),
     **dict.fromkeys(("jawOpen", "mouthClose", "mouthRollLower", "mouthRollUpper"), 1.0),
     **dict.fromkeys(("mouthSmileLeft", "mouthSmileRight"), 1.0),
@@ -152,7 +155,7 @@ class _System:
         for k, pair in enumerate(_LIP_GAPS):
             self._gaps[k, [numbers.index(fap) for fap in pair]] = 1.0
         self._reach = np.vstack([reach, self._gaps @ reach])
-        self._limit = np.array([_LIMIT_OF.get(name, MAX_WEIGHT) for name in names])
+        self._limit = np.array([_LIMIT_OF.get(name, _LIMIT) for name in names])
         regions = [_REGION_OF_GROUP[fap.group] for fap in rows]
         self._same_region = np.array([[one == other for one in regions] for other in regions], dtype=np.float64)
         self._same_region /= self._same_region.sum(axis=1, keepdims=True)

@@ -50,8 +50,8 @@ def test_the_table_goes_on_beyond_its_words():
     happy = np.array([emotion_words()["Happy"].as_tuple()])
     model = load_model("table")
     assert model.predict(1.5 * happy)[0, 7] > model.predict(happy)[0, 7]
-    assert model.predict(np.array([[0.9, 0.4, 0.4]]))[0, 7] == 1.0
-    assert model.predict(np.array([[-0.9, 0.3, 0.2]]))[0, 7] == -1.0
+    assert model.predict(np.array([[0.9, 0.4, 0.4]]))[0, 7] > 0.8
+    assert model.predict(np.array([[-0.9, 0.3, 0.2]]))[0, 7] < -0.6
 
 
 def test_linear_is_the_affine_minimum_mean_square_estimator():
