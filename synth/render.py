@@ -249,7 +249,7 @@ class _Graphics:
         clamp = self._gl.GL_CLAMP_TO_EDGE
         sampler = self._pyrender.Sampler(wrapS=clamp, wrapT=clamp)
         texture = self._pyrender.Texture(source=rig.texture, source_channels="RGB", sampler=sampler)
-        material = self._pyrender.MetallicRoughnessMaterial(baseColorTexture=texture, doubleSided=True)
+        material = self._pyrender.MetallicRoughnessMaterial(baseColorTexture=texture, doubleSided=False)
         primitive = self._pyrender.Primitive(
             positions=rig.rest,
             normals=rig.rest,

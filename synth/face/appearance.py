@@ -16,5 +16,5 @@ def dress(face: FaceModel, palette: Palette | None = None) -> tuple[list[Surface
     """Return the surfaces of the figure, the left and the right eyeball last, and the painting they refer to."""
     colours = palette if palette is not None else Palette()
     bust = skin(face, colours)
-    surfaces = [bust, bob(face, bust), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
+    surfaces = [bust, *bob(face, bust), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
     return surfaces, paint(colours)

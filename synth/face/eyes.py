@@ -16,6 +16,7 @@ PUPIL = np.radians(10.5)
 _MERIDIANS = 40
 _SCLERA = np.array([0.86, 0.835, 0.815])
 _VEIN = np.array([0.80, 0.60, 0.56])
+_LASH_CLEARANCE = 0.006
 _LASH = np.array([0.085, 0.065, 0.06])
 
 
@@ -75,7 +76,7 @@ def lashes(face: FaceModel) -> list[Surface]:
     """Return the lashes: the helper strips, drawn in towards their roots."""
     strips = []
     for side in range(2):
-        for row, length in ((2, 0.42),):
+        for row, length in ((2, 0.45),):
             part = face.parts[f"{'lr'[side]}-eyelashes-{row}"]
             strips.append(_strip(part, face.eye_centres[side], face.eye_radius, length))
     return strips
@@ -87,5 +88,7 @@ def _strip(part: Part, centre: Floats, radius: float, length: float) -> Surface:
     roots = np.flatnonzero(distance < radius * 1.16)
     nearest = roots[np.argmin(np.linalg.norm(part.vertices[:, None] - part.vertices[roots], axis=2), axis=1)]
     vertices = part.vertices[nearest] + length * (part.vertices - part.vertices[nearest])
+    # In front of the lid's own margin.
+    vertices = vertices + _LASH_CLEARANCE * (vertices - centre) / np.linalg.norm(vertices - centre, axis=1)[:, None]
     morphs = part.morphs[:, nearest] + length * (part.morphs - part.morphs[:, nearest])
     return loose_surface(vertices, part.quads, morphs, _LASH, gloss=(0.0, 1.0))

@@ -1,5 +1,7 @@
 """Hair: a chin-length bob with a middle parting, as one sheet over the scalp."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
@@ -18,8 +20,16 @@ _GAP_AT_FACE, _GAP = 0.02, 0.055
 """How far the sheet lies above the scalp at its front edge and elsewhere; dm."""
 
 
-def bob(face: FaceModel, skin: Surface) -> Surface:
-    """Return the sheet of hair over a skin whose scalp is already thickened.
+def bob(face: FaceModel, skin: Surface) -> list[Surface]:
+    """Return the outer and the dark inner side of a bob over a skin whose scalp is already thickened."""
+    outside = _sheet(face, skin)
+    matt = np.broadcast_to((0.0, 1.0), outside.gloss.shape)
+    inside = replace(outside, quads=outside.quads[:, ::-1], shade=0.3 * outside.shade, gloss=matt)
+    return [outside, inside]
+
+
+def _sheet(face: FaceModel, skin: Surface) -> Surface:
+    """Build the sheet.
 
     Rows run from the crown down: over the dome of the head by elevation, then falling to the hem by height.
     Columns run from the left front edge round the back to the right one.

@@ -35,7 +35,7 @@ MORPH_NAMES = (
 """The 52 ARKit morphs, in Apple's order; Left and Right are the subject's."""
 
 _LID_MIDDLE = 0.06
-_LID_OVERLAP = 1.06
+_LID_OVERLAP = 1.25
 """Half-width in dm of the middle of the eye, and how much further than to touch closed lids move."""
 
 PARTS = (

@@ -83,8 +83,8 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     picture = _mix(picture, np.multiply(palette.hair, 1.6), 0.85 * _brow(angle, height, noise))
     strands = noise.stretched(rough=(300, 5))
     hair = np.multiply(palette.hair, (1.0 + 0.30 * strands)[..., None])
-    inside = above_hairline(angle, height) + 0.022 * noise.stretched(rough=(420, 10))
-    picture = _mix(picture, hair, _step(inside, -0.07, 0.06))
+    inside = above_hairline(angle, height) + 0.014 * noise.stretched(rough=(420, 10))
+    picture = _mix(picture, hair, _step(inside, -0.06, 0.07))
     shirt = np.multiply(palette.shirt, (1.0 + 0.03 * noise.stretched(rough=(500, 500)))[..., None])
     under = below_neckline(angle, height)
     band = 1.0 - 0.10 * _step(0.10 - under, -0.006, 0.006) - 0.12 * np.exp(-(((under - 0.10) / 0.010) ** 2))
@@ -108,7 +108,7 @@ def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> F
 def _brow(angle: Floats, height: Floats, noise: "_Noise") -> Floats:
     """Return how much brow hair covers each place: a gentle arch that thins towards its tail."""
     along = (angle - 0.135) / 0.45
-    centre = 7.495 + 0.055 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
+    centre = 7.510 + 0.042 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
     half = 0.036 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
     across = np.abs(height - centre) / half
     hairs = noise.slanted(angle, height)

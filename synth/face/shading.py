@@ -60,12 +60,12 @@ def _spread(n: int) -> Floats:
 
 
 def smooth(values: Floats, quads: NDArray[np.int64], *, rounds: int) -> Floats:
-    """Return values (N,) of vertices, drawn halfway to their neighbours' mean in each round."""
+    """Return values (N,) or (N, k) of vertices, drawn halfway to their neighbours' mean in each round."""
     n = len(values)
     pairs = np.concatenate([quads[:, [0, 1]], quads[:, [1, 2]], quads[:, [2, 3]], quads[:, [3, 0]]])
     both = np.concatenate([pairs, pairs[:, ::-1]])
     near = sparse.csr_array((np.ones(len(both)), (both[:, 0], both[:, 1])), shape=(n, n))
-    count = np.asarray(near.sum(axis=1)).ravel()
+    mean = sparse.diags_array(1.0 / np.asarray(near.sum(axis=1)).ravel()) @ near
     for _ in range(rounds):
-        values = 0.5 * values + 0.5 * (near @ values) / count
+        values = 0.5 * values + 0.5 * (mean @ values)
     return values

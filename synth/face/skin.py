@@ -7,7 +7,7 @@ from scipy import sparse
 from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
 from synth.face.painting import Palette, above_hairline, below_neckline, place, wrap
-from synth.face.shading import openness, vertex_normals
+from synth.face.shading import openness, smooth, vertex_normals
 from synth.face.subdivision import catmull_clark
 from synth.face.surface import Surface
 
@@ -17,6 +17,9 @@ _MOUTH = np.array([0.40, 0.16, 0.16])
 _UPPER_LID, _LOWER_LID = np.array([0.16, 0.11, 0.10]), np.array([0.48, 0.30, 0.27])
 _HAIR_THICKNESS, _SHIRT_THICKNESS = 0.10, 0.035
 """How far hair and shirt stand off the skin; dm."""
+
+_SMILE_ROUNDS = 12
+"""Rounds of smoothing that take the sharp folds out of smiling cheeks."""
 
 
 def skin(face: FaceModel, palette: Palette) -> Surface:
@@ -29,6 +32,10 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
     ears, lips, mouth = masks["ears"], masks["lips"], masks["inside-mouth"]
     jaw_drop = -morphs[face.morph_names.index("jawOpen"), :, 1]
     vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
+    cheeks = 1 - np.clip(2 * smooth(np.maximum(lips, masks["eyelids"]), quads, rounds=4), 0, 1)
+    for name in ("mouthSmileLeft", "mouthSmileRight"):
+        morph = morphs[face.morph_names.index(name)]
+        morph += cheeks[:, None] * (smooth(morph, quads, rounds=_SMILE_ROUNDS) - morph)
     side = _step(vertices[:, 0], -0.1, 0.1)[:, None]
     for name in CLOSED:
         left, right = (morphs[face.morph_names.index(name + side_name)] for side_name in ("Left", "Right"))

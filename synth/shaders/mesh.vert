@@ -9,7 +9,6 @@ layout(location = COLOR_0_LOC) in vec4 color_0;
 uniform mat4 V;
 uniform mat4 P;
 
-out vec3 world;
 out vec3 towards;
 out vec2 uv;
 out vec2 gloss;
@@ -18,7 +17,6 @@ out vec4 paint;
 void main()
 {
     gl_Position = P * V * vec4(position, 1.0);
-    world = position;
     towards = normal;
     uv = texcoord_0;
     gloss = texcoord_1;
