@@ -20,7 +20,7 @@ def pep_to_fap(values: NDArray[np.floating] | Floats) -> Floats:
 
     The key FAP is ``F_key = PEP * F_max``, with one maximum for positive and one for negative values, as the face's
     reach differs (lids close farther than they open); any other FAP of the PEP is ``F_j = alpha_j * F_key``. As in
-    MTAP's Eq. 4, and unlike in ACII, an ``alpha_j`` may be larger than 1: the middle of a lip goes farther than the key.
+    MTAP's Eq. 4, and unlike in ACII, an ``alpha_j`` may be larger than 1: the middle of a lip goes beyond the key.
 
     Parameters
     ----------
