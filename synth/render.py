@@ -140,7 +140,7 @@ def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float6
     """Frame head and shoulders as in a video call; return the camera's position and its vertical field of view."""
     eye_line = float(face.eye_centres[:, 1].mean())
     head_height = float(face.pivots["head-2"][1] - face.pivots["jaw"][1])
-    shown = head_height * max(1.62, 1.42 * height / width)
+    shown = head_height * max(1.62, 1.15 * height / width)
     centre = eye_line - 0.085 * shown
     distance = shown / (2 * np.tan(_FIELD_OF_VIEW / 2))
     return np.array([0.0, centre, distance + 1.0]), float(_FIELD_OF_VIEW)

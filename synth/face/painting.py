@@ -18,7 +18,7 @@ _HEAD_AXIS, _NECK_AXIS = 0.4, 0.15
 _LOWEST, _HIGHEST = 4.4, 8.6
 _ALL_HAIR = (8.2, 8.55)
 """Heights in dm between which the painting shows hair at each angle."""
-_SLOPE, _NECK_RADIUS = 0.8, 0.5
+_SLOPE, _NECK_RADIUS = 1.3, 0.5
 """The shoulders spread away from the axis: their distance beyond the neck counts as depth below it."""
 
 
@@ -66,7 +66,7 @@ def above_hairline(angle: ArrayLike, height: ArrayLike) -> Floats:
 def below_neckline(angle: ArrayLike, height: ArrayLike) -> Floats:
     """Return how far a place lies under the shirt, in dm; negative on bare skin."""
     line = _smooth_line(
-        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [4.97, 5.06, 5.22, 5.37, 5.40]
+        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [4.81, 4.91, 5.07, 5.25, 5.30]
     )
     return line - np.asarray(height, dtype=np.float64)
 
@@ -85,7 +85,9 @@ def paint(palette: Palette) -> NDArray[np.uint8]:
     hair = np.multiply(palette.hair, (1.0 + 0.30 * strands)[..., None])
     inside = above_hairline(angle, height) + 0.014 * noise.stretched(rough=(420, 10))
     picture = _mix(picture, hair, _step(inside, -0.06, 0.07))
-    shirt = np.multiply(palette.shirt, (1.0 + 0.03 * noise.stretched(rough=(500, 500)))[..., None])
+    # The lowest row stands for all below it, where a pattern would be drawn out to streaks.
+    weave = 0.03 * noise.stretched(rough=(500, 500)) * _step(height, _LOWEST + 0.05, _LOWEST + 0.3)
+    shirt = np.multiply(palette.shirt, (1.0 + weave)[..., None])
     under = below_neckline(angle, height)
     band = 1.0 - 0.10 * _step(0.10 - under, -0.006, 0.006) - 0.12 * np.exp(-(((under - 0.10) / 0.010) ** 2))
     picture = _mix(picture, shirt * band[..., None], _step(under, -0.005, 0.005))
