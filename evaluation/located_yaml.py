@@ -41,7 +41,7 @@ class _CoreLoader(yaml.SafeLoader):
     """Plain scalars as in the YAML 1.2 core schema: ``no`` and ``2026-01-01`` stay text."""
 
     # A new dict, since that of SafeLoader is shared with every other user of yaml in the process.
-    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - PyYAML's class attribute, declared without ClassVar
+    yaml_implicit_resolvers: dict[str, Any] = {}  # noqa: RUF012 - PyYAML declares it without ClassVar
 
 
 _CoreLoader.add_implicit_resolver("tag:yaml.org,2002:null", re.compile(r"(?:null|Null|NULL|~|)$"), None)

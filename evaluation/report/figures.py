@@ -98,7 +98,7 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     ----------
     Jia et al. (2013), Table 8, drawn.
     """
-    figure = Figure(figsize=(11, 4.5), layout="constrained")
+    figure = Figure(figsize=(11, 4.2), layout="constrained")
     panels = figure.subplots(1, 3)
     limit = _pad_limit(report)
     pooled = {found.dimension: found for found in report.reverse_evaluation if found.condition is None}
@@ -125,7 +125,7 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     return figure
 
 
-def mos(report: StudyReport) -> Figure:
+def mos_by_condition(report: StudyReport) -> Figure:
     """Draw the mean opinion score of each condition with its interval, and that of each stimulus behind it.
 
     Parameters
@@ -168,7 +168,7 @@ def mos(report: StudyReport) -> Figure:
 
 
 _FIGURES: MappingProxyType[str, Callable[[StudyReport], Figure]] = MappingProxyType(
-    {"reverse_evaluation": reverse_evaluation, "mos": mos}
+    {"reverse_evaluation": reverse_evaluation, "mos_by_condition": mos_by_condition}
 )
 _CAPTIONS = MappingProxyType(
     {
@@ -176,14 +176,14 @@ _CAPTIONS = MappingProxyType(
             "Evaluated against input PAD. Black points: each stimulus over all conditions, with the least-squares line "
             "and Pearson's r; coloured points: each condition. On the dashed line people see what was put in."
         ),
-        "mos": (
+        "mos_by_condition": (
             "Mean opinion score of each condition over all ratings, with its 95 % interval; the small points on its "
             "left are the stimuli."
         ),
     }
 )
 NAMES = tuple(_FIGURES)
-"""Names of the figures, in the order of the report."""
+"""Names of the figures, each that of the section in `evaluation.report.tables.sections` it belongs to."""
 
 
 def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, limit: float) -> None:

@@ -22,16 +22,14 @@ def render(report: StudyReport) -> str:
     str
         HTML in English with figures as inline SVG; every text of the study is escaped.
     """
-    drawings = [
-        # The drawing is made by figures.draw, whose texts matplotlib has escaped.
-        {"svg": Markup(figures.draw(name, report)), "caption": figures.caption(name)}  # noqa: S704
-        for name in figures.NAMES
-    ]
+    # Markup, since matplotlib has escaped the texts in its drawing.
+    drawings = {name: Markup(figures.draw(name, report)) for name in figures.NAMES}  # noqa: S704
     return _template().render(
         title=tables.label(report.spec.title),
         report=report,
         sections=tables.sections(report),
         drawings=drawings,
+        caption=figures.caption,
         headline=_headline(report),
     )
 

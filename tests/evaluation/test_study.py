@@ -154,6 +154,13 @@ class TestDigest:
         assert without != DEMO
         assert StudySpec.from_yaml(without).digest == load_bundled("demo").digest
 
+    def test_a_field_that_a_later_version_adds_does_not_count_where_it_is_not_used(self):
+        class Later(StudySpec):
+            quota: int = 100
+
+        assert Later.from_yaml(DEMO).digest == load_bundled("demo").digest
+        assert Later.from_yaml(f"{DEMO}\nquota: 50\n").digest != load_bundled("demo").digest
+
     def test_every_change_of_content_counts(self):
         changes = [("seed: 2013", "seed: 2014"), ("0.55", "0.56"), ("Thank you", "Many thanks"), ("fps: 25", "fps: 24")]
         digests = {StudySpec.from_yaml(DEMO.replace(old, new)).digest for old, new in changes}

@@ -52,6 +52,13 @@ def test_small_designs_are_as_good_as_they_can_be(make_study, stimuli, condition
         assert (repeats(order, 0), repeats(order, 1)) == fewest(assigned_cells(spec, index))
 
 
+@pytest.mark.parametrize("stimuli", [20, 21, 40])
+def test_two_conditions_take_turns(make_study, stimuli):
+    # Only strict alternation avoids repeats here, so the order must look ahead.
+    for index in range(20):
+        assert repeats(trial_order(make_study(stimuli, 2), index), 1) == 0
+
+
 def test_participants_get_different_orders():
     orders = {tuple(cell.stimulus for cell in trial_order(DEMO, index)) for index in range(200)}
     assert len(orders) == 200

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from evaluation.errors import EvaluationError
-from evaluation.report import figures
+from evaluation.report import figures, tables
 from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
 from evaluation.simulate import simulate_responses
 
@@ -53,7 +53,7 @@ def test_the_scatter_names_stimuli_and_correlations(report):
 
 
 def test_the_opinion_figure_names_means_and_the_scale(report):
-    shown = texts(figures.draw("mos", report))
+    shown = texts(figures.draw("mos_by_condition", report))
     assert {f"{found.result.mean:.2f}" for found in report.mos_by_condition} <= set(shown)
     assert any("Expressive" in text for text in shown)
 
@@ -61,7 +61,7 @@ def test_the_opinion_figure_names_means_and_the_scale(report):
 def test_without_answers_the_figures_say_so(demo):
     empty = analyse(demo, EMPTY)
     assert any("No face has been rated" in text for text in texts(figures.draw("reverse_evaluation", empty)))
-    assert sum("no ratings" in text for text in texts(figures.draw("mos", empty))) == 3
+    assert sum("no ratings" in text for text in texts(figures.draw("mos_by_condition", empty))) == 3
 
 
 def test_labels_in_chinese_alone_are_replaced_by_names(demo, answers):
@@ -82,8 +82,12 @@ def test_texts_of_a_study_are_no_markup_and_no_formula(demo, answers):
     assert "<script>x</script> $\\frac$" in texts(svg)
 
 
+def test_each_figure_belongs_to_a_section(report):
+    assert set(figures.NAMES) <= {section.name for section in tables.sections(report)}
+
+
 def test_an_unknown_figure_is_named_with_those_there_are(report):
-    with pytest.raises(EvaluationError, match="no figure 'pie'; there are reverse_evaluation, mos"):
+    with pytest.raises(EvaluationError, match="no figure 'pie'; there are reverse_evaluation, mos_by_condition"):
         figures.draw("pie", report)
     with pytest.raises(EvaluationError, match="no figure 'pie'"):
         figures.caption("pie")
