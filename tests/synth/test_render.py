@@ -55,6 +55,15 @@ def test_head_is_framed_with_room_around_it(renderer: Renderer, weights: Weights
     assert not figure[: len(figure) // 2, [0, -1]].any()
 
 
+@pytest.mark.parametrize("size", [(144, 256), (128, 256), (256, 144)])
+def test_the_bust_reaches_the_lower_edge(face: FaceModel, weights: Weights, size: tuple[int, int]) -> None:
+    with Renderer(face, width=size[0], height=size[1]) as renderer:
+        lowest = renderer.frame(weights())[-1, size[0] // 4 : 3 * size[0] // 4].astype(int)
+    red, _, blue = lowest.T
+    assert (blue > red).all(), "clothes from side to side"
+    assert (lowest.max(axis=1) < 180).all(), "no background"
+
+
 def test_equal_input_gives_equal_frames(renderer: Renderer, face: FaceModel, weights: Weights) -> None:
     pose = {"head": (0.1, 0.2, -0.1), "eyes": ((0.1, 0.0), (0.1, 0.1))}
     first = renderer.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose)
