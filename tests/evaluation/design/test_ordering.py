@@ -104,7 +104,7 @@ def test_the_orders_of_the_demo_are_fixed_for_ever():
 @pytest.mark.parametrize("hash_seed", ["0", "4711"])
 def test_another_process_with_another_hash_seed_gives_the_same_order(hash_seed):
     program = (
-        "import json; from evaluation.design.ordering import trial_order; from evaluation.study import Presentation, load_bundled; "
+        "import json; from evaluation.design.ordering import trial_order; from evaluation.study import load_bundled; "
         "print(json.dumps([trial_order(load_bundled('demo'), index) for index in (0, 7, 99999)]))"
     )
     printed = subprocess.run(
