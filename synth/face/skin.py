@@ -30,22 +30,12 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
     morphs = np.stack([matrix @ morph for morph in face.morphs])
     masks = {name: np.clip(matrix @ mask, 0, 1) for name, mask in face.masks.items()}
     ears, lips, mouth = masks["ears"], masks["lips"], masks["inside-mouth"]
-    jaw_drop = -morphs[face.morph_names.index("jawOpen"), :, 1]
-    vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
-    cheeks = 1 - np.clip(2 * smooth(np.maximum(lips, masks["eyelids"]), quads, rounds=4), 0, 1)
-    for name in ("mouthSmileLeft", "mouthSmileRight"):
-        morph = morphs[face.morph_names.index(name)]
-        morph += cheeks[:, None] * (smooth(morph, quads, rounds=_SMILE_ROUNDS) - morph)
-    side = _step(vertices[:, 0], -0.1, 0.1)[:, None]
-    for name in CLOSED:
-        left, right = (morphs[face.morph_names.index(name + side_name)] for side_name in ("Left", "Right"))
-        seal = sealing(vertices + left + right, quads, lips, jaw_drop)
-        left += side * seal
-        right += (1 - side) * seal
+    vertices = _close_mouth(face, vertices, quads, morphs, masks)
     angle, height = wrap(template)
     hair = _step(above_hairline(angle, height), 0.0, 0.35) * (1 - _step(ears, 0.0, 0.3))
     # The sheet of hair hides the scalp, but for the parting and a margin along the hairline.
     covered = (hair > 0.9) & (np.abs(template[:, 0]) > 0.25) & (template[:, 1] > 7.3)
+    hidden = covered | _behind_eyes(face, vertices)
     shirt = _step(below_neckline(angle, height), -0.01, 0.05)
 
     shade = 0.28 + 0.72 * np.clip(openness(vertices, quads) / 0.92, 0, 1) ** 1.1
@@ -71,8 +61,30 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         shade=shade,
         gloss=gloss,
         follow=_follow(face, vertices),
-        drawn=~covered[quads].all(axis=1),
+        drawn=~hidden[quads].all(axis=1),
     )
+
+
+def _close_mouth(
+    face: FaceModel, vertices: Floats, quads: NDArray[np.int64], morphs: Floats, masks: dict[str, Floats]
+) -> Floats:
+    """Return vertices whose lips meet; let them meet in the morphs that leave the mouth closed, too."""
+    number = {name: k for k, name in enumerate(face.morph_names)}
+    lips = masks["lips"]
+    cheeks = 1 - np.clip(2 * smooth(np.maximum(lips, masks["eyelids"]), quads, rounds=4), 0, 1)
+    for name in ("mouthSmileLeft", "mouthSmileRight"):
+        morph = morphs[number[name]]
+        morph += cheeks[:, None] * (smooth(morph, quads, rounds=_SMILE_ROUNDS) - morph)
+
+    jaw_drop = -morphs[number["jawOpen"], :, 1]
+    vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
+    leftward = _step(vertices[:, 0], -0.1, 0.1)[:, None]
+    for name in CLOSED:
+        left, right = (morphs[number[name + side]] for side in ("Left", "Right"))
+        seal = sealing(vertices + left + right, quads, lips, jaw_drop)
+        left += leftward * seal
+        right += (1 - leftward) * seal
+    return vertices
 
 
 def _firm(matrix: sparse.csr_array, places: Floats) -> sparse.csr_array:
@@ -95,6 +107,14 @@ def _lid_line(face: FaceModel, vertices: Floats, row: int) -> Floats:
         distance = np.linalg.norm(vertices[near, None] - roots, axis=2).min(axis=1)
         line[near] = np.maximum(line[near], 1 - _step(distance, 0.006, 0.020))
     return line
+
+
+def _behind_eyes(face: FaceModel, vertices: Floats) -> NDArray[np.bool_]:
+    """Tell which vertices line the sockets behind the eyeballs, where nobody sees them."""
+    arms = vertices[:, None] - face.eye_centres
+    near = np.linalg.norm(arms, axis=2) < 1.6 * face.eye_radius
+    behind: NDArray[np.bool_] = (near & (arms[..., 2] < 0.0)).any(axis=1)
+    return behind
 
 
 def _follow(face: FaceModel, vertices: Floats) -> Floats:
