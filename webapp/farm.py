@@ -198,8 +198,10 @@ def watch(settings: Settings, stop: threading.Event | None = None) -> None:
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: stop.set())
     database = Database(settings.database_url)
+    parent = os.getppid()
     statuses: tuple[ClipStatus, ...] = UNFINISHED
-    while not stop.is_set():
+    # A server that was killed cannot say goodbye: its companion then has another parent, and ends by itself.
+    while not stop.is_set() and os.getppid() == parent:
         try:
             render_unfinished(database, settings, statuses=statuses)
             statuses = (ClipStatus.PENDING,)
@@ -207,3 +209,7 @@ def watch(settings: Settings, stop: threading.Event | None = None) -> None:
             logging.getLogger(__name__).warning("%s", error)
             statuses = UNFINISHED
         stop.wait(POLL_SECONDS)
+
+
+if __name__ == "__main__":
+    watch(Settings.from_env())

@@ -1,19 +1,22 @@
 """``padlab serve``: gunicorn in front, a companion process that renders behind."""
 
-import multiprocessing
+import os
 import socket
+import subprocess
+import sys
 from typing import Any
 
 import click
 from gunicorn.app.base import BaseApplication
 
-from webapp import create_app, farm
+from webapp import create_app
 from webapp.cli.context import open_database
 from webapp.config import Settings
 from webapp.errors import ConfigError
 
 THREADS = 4
 KEEPALIVE_SECONDS = 5
+STOP_SECONDS = 15
 
 
 class Server(BaseApplication):  # type: ignore[misc]
@@ -56,8 +59,9 @@ def require_free_port(host: str, port: int) -> None:
 
 def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
     """Serve until stopped; clips that are pending are rendered meanwhile."""
-    renderer = multiprocessing.get_context("spawn").Process(target=farm.watch, args=(settings,), name="padlab-farm")
-    renderer.start()
+    # A process of its own that shares nothing with the web workers; it reads the same settings.
+    renderer = subprocess.Popen([sys.executable, "-m", "webapp.farm"])
+    master = os.getpid()
     try:
         bind = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         Server(
@@ -75,8 +79,10 @@ def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
             },
         ).run()
     finally:
-        renderer.terminate()
-        renderer.join(10)
+        # Gunicorn's workers are forks of this process and pass here too when they end.
+        if os.getpid() == master:
+            renderer.terminate()
+            renderer.wait(STOP_SECONDS)
 
 
 @click.command()

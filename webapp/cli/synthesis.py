@@ -51,7 +51,9 @@ def _check_out(out: Path, suffix: str) -> None:
 @click.argument("a", type=float)
 @click.argument("d", type=float)
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The picture (PNG).")
-@click.option("--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression.")
+@click.option(
+    "--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression."
+)
 @click.option("--identity", default="default", show_default=True, help="Whose face.")
 @click.option("--size", type=SizeType(), default="720x576", show_default=True)
 def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:

@@ -12,8 +12,8 @@ from werkzeug.wrappers import Response as BaseResponse
 from evaluation.report import figures, html, tables
 from webapp import locale, security
 from webapp.db import Database
-from webapp.experimenter.login import Account, login_manager
 from webapp.errors import NotFoundError
+from webapp.experimenter.login import Account, login_manager
 from webapp.models import StudyState
 from webapp.services import clips, enrolment, experimenters, exports, results, studies
 

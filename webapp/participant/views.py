@@ -52,7 +52,7 @@ def _study_page(template: str, spec: StudySpec, study: Study, **values: Any) -> 
 def home() -> str:
     """List the studies that are open."""
     with _database().read() as db:
-        found = [study for study in studies.overviews(db) if study.state == StudyState.OPEN]
+        found = [(spec.slug, spec.title[_language(spec)]) for spec in studies.open_specs(db)]
     return render_template("participant/home.html", studies=found, languages=list(locale.LOCALES))
 
 

@@ -108,6 +108,12 @@ def spec_of(study: Study) -> StudySpec:
     return StudySpec.from_yaml(study.text, source=f"{study.slug} (as applied)")
 
 
+def open_specs(session: Session) -> list[StudySpec]:
+    """Return the study files of all open studies, by slug."""
+    found = session.scalars(select(Study).where(Study.state == StudyState.OPEN).order_by(Study.slug))
+    return [spec_of(study) for study in found]
+
+
 def set_state(session: Session, slug: str, state: StudyState) -> Study:
     """Open or close a study for participants.
 

@@ -24,6 +24,11 @@ def run(environment: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> object:
     return invoke
 
 
+@pytest.fixture
+def in_empty_folder(database: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
 def _fails(result: Result, *parts: str) -> None:
     assert result.exit_code == 1, result.output
     assert result.stderr.startswith("Error: ")
@@ -100,14 +105,8 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
     ],
 )
 def test_wrong_input_gives_one_sentence(
-    run: object,
-    database: object,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    arguments: tuple[str, ...],
-    parts: tuple[str, ...],
+    run: object, in_empty_folder: None, arguments: tuple[str, ...], parts: tuple[str, ...]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     _fails(run(*arguments), *parts)
 
 
