@@ -102,9 +102,10 @@ class Renderer:
         given = {"weights": ((52,), weights), "head": ((3,), head), "eyes": ((2, 2), eyes)}
         checked = [_finite(name, value, shape) for name, (shape, value) in given.items()]
         positions, normals = self._rig.pose(*checked)
-        self._vertices[:, 0:3] = positions
-        self._vertices[:, 3:6] = normals
         with _current() as gl:
+            # Inside the lock: clips of several threads may share this renderer.
+            self._vertices[:, 0:3] = positions
+            self._vertices[:, 3:6] = normals
             gl.upload(self._mesh, self._vertices)
             return gl.draw(self._drawing, self._scene)
 
