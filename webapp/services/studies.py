@@ -1,6 +1,7 @@
 """Studies: apply a study file, open and close, look up."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -105,7 +106,13 @@ def find(session: Session, slug: str) -> Study:
 
 def spec_of(study: Study) -> StudySpec:
     """Return the study file as it was applied."""
-    return StudySpec.from_yaml(study.text, source=f"{study.slug} (as applied)")
+    return _parsed(study.text, f"{study.slug} (as applied)")
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str, source: str) -> StudySpec:
+    """Read a study file; every page needs it, and reading takes longer than the rest of the page."""
+    return StudySpec.from_yaml(text, source=source)
 
 
 def open_specs(session: Session) -> list[StudySpec]:
