@@ -8,6 +8,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Callable
 from pathlib import Path
 from typing import Self
 
@@ -34,6 +35,32 @@ def padlab(*arguments: str, environment: dict[str, str], stdin: str = "") -> sub
     )
 
 
+def wait_until(true: Callable[[], bool], *, seconds: float = 30) -> None:
+    """Wait until something is so; fail when it never is."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it never came true"
+        time.sleep(0.1)
+
+
+def processes_below(process: int) -> list[int]:
+    """Return all descendants of a process that are still running."""
+    parents: dict[int, list[int]] = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            state, parent = (folder / "stat").read_text().rpartition(")")[2].split()[:2]
+        except (FileNotFoundError, ProcessLookupError):
+            continue
+        if state != "Z":
+            parents.setdefault(int(parent), []).append(int(folder.name))
+    found, todo = [], [process]
+    while todo:
+        children = parents.get(todo.pop(), [])
+        found += children
+        todo += children
+    return found
+
+
 class Server:
     """``padlab serve`` on a free port; a context manager."""
 
@@ -49,6 +76,12 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         self.stop(signal.SIGTERM)
+
+    @property
+    def process_group(self) -> int:
+        """The server's first process."""
+        assert self._process is not None
+        return self._process.pid
 
     def start(self) -> None:
         """Start the server and wait until it answers."""
@@ -70,8 +103,11 @@ class Server:
         raise RuntimeError("padlab serve did not answer")
 
     def stop(self, how: signal.Signals) -> None:
-        """Stop the server and all its children with a signal."""
+        """Stop the server with a signal; SIGKILL also hits its web workers, as a power cut would."""
         if self._process is None or self._process.poll() is not None:
             return
-        os.killpg(self._process.pid, how)
-        self._process.wait(30)
+        if how == signal.SIGKILL:
+            os.killpg(self._process.pid, how)
+        else:
+            self._process.send_signal(how)
+        self._process.wait(60)

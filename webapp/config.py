@@ -4,7 +4,7 @@ import os
 import secrets
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from sqlalchemy.engine import make_url
@@ -13,6 +13,7 @@ from sqlalchemy.exc import ArgumentError
 from webapp.errors import ConfigError
 
 DATABASES = ("sqlite", "postgresql")
+SECRET_LENGTH = 32
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +37,11 @@ class Settings:
     """
 
     home: Path
-    database_url: str
+    database_url: str = field(repr=False)
     media_url: str
     scheduler: str | None
     face_dir: Path
-    secret_key: str
+    secret_key: str = field(repr=False)
 
     @classmethod
     def from_env(cls, environ: Mapping[str, str] | None = None) -> "Settings":
@@ -65,7 +66,7 @@ class Settings:
             media_url=env.get("PADLAB_MEDIA_URL") or str(home / "media"),
             scheduler=_scheduler(env.get("PADLAB_SCHEDULER") or None),
             face_dir=Path(env.get("PADLAB_FACE_DIR") or home / "face").expanduser().resolve(),
-            secret_key=env.get("PADLAB_SECRET_KEY") or _kept_secret(home / "secret_key"),
+            secret_key=_given_secret(env.get("PADLAB_SECRET_KEY") or "") or _kept_secret(home / "secret_key"),
         )
 
 
@@ -92,6 +93,15 @@ def _scheduler(address: str | None) -> str | None:
     return address
 
 
+def _given_secret(key: str) -> str:
+    if key and len(key) < SECRET_LENGTH:
+        raise ConfigError(
+            f"PADLAB_SECRET_KEY has {len(key)} characters, which can be guessed; "
+            f"it takes at least {SECRET_LENGTH} random ones"
+        )
+    return key
+
+
 def _kept_secret(path: Path) -> str:
     """Make the key that signs cookies once; whoever comes first makes it, all others read it."""
     if not path.exists():
@@ -107,6 +117,6 @@ def _kept_secret(path: Path) -> str:
         finally:
             draft.unlink(missing_ok=True)
     key = path.read_text(encoding="ascii", errors="replace").strip()
-    if len(key) < 32:
+    if len(key) < SECRET_LENGTH:
         raise ConfigError(f"{path} holds no usable key; remove it so that a new one is made (everybody logs in again)")
     return key

@@ -9,8 +9,9 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, event, make_url
-from sqlalchemy.exc import DBAPIError
+from alembic.util.exc import CommandError
+from sqlalchemy import Connection, Engine, create_engine, event, make_url, text
+from sqlalchemy.exc import DBAPIError, IntegrityError
 from sqlalchemy.orm import DeclarativeBase, Session
 from sqlalchemy.schema import MetaData
 
@@ -18,6 +19,7 @@ from webapp.errors import DatabaseError
 from webapp.resources import resource_dir
 
 BUSY_SECONDS = 30
+UPGRADE_LOCK = 0x9AD1AB
 
 
 class Base(DeclarativeBase):
@@ -52,23 +54,39 @@ class Database:
     @contextmanager
     def read(self) -> Iterator[Session]:
         """Open a session for reading; nothing is committed."""
-        with Session(self.engine, autoflush=False) as session:
+        with _one_sentence(self.url), Session(self.engine, autoflush=False) as session:
             yield session
 
     @contextmanager
     def write(self) -> Iterator[Session]:
         """Open a session whose transaction is committed, and durable, when the block ends without an error."""
-        with Session(self._writing, expire_on_commit=False) as session, session.begin():
+        with (
+            _one_sentence(self.url),
+            Session(self._writing, expire_on_commit=False) as session,
+            session.begin(),
+        ):
             yield session
 
     def upgrade(self) -> str:
         """Bring the schema to the newest revision and return that revision."""
         with _one_sentence(self.url):
             config = _alembic_config()
-            with self.engine.begin() as connection:
+            with self._writing.begin() as connection:
+                if connection.dialect.name == "postgresql":
+                    # Two that start at once must not both make the tables; the lock ends with the transaction.
+                    connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": UPGRADE_LOCK})
                 config.attributes["connection"] = connection
-                command.upgrade(config, "head")
+                try:
+                    command.upgrade(config, "head")
+                except CommandError as error:
+                    raise self._newer(str(error)) from error
         return self.head()
+
+    def _newer(self, reason: str) -> DatabaseError:
+        return DatabaseError(
+            f"The database {_shown(self.url)} was made by another version of padlab ({reason}); "
+            "use that version, or another database"
+        )
 
     def current(self) -> str | None:
         """Return the revision that the database has, None for an empty one."""
@@ -108,6 +126,9 @@ def _shown(url: str) -> str:
 def _one_sentence(url: str) -> Iterator[None]:
     try:
         yield
+    except IntegrityError:
+        # Not a fault of the database, but of whoever wrote to it.
+        raise
     except DBAPIError as error:
         reason = str(error.orig).strip().splitlines()[0]
         raise DatabaseError(

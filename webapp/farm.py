@@ -4,6 +4,7 @@ Rendering is idempotent (a clip's name is the digest of all that it depends on) 
 lost worker, scheduler or web process loses nothing: what is unfinished is submitted again.
 """
 
+import hashlib
 import logging
 import os
 import signal
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, LocalCluster, as_completed
+from distributed import Client, LocalCluster, wait
 
 from synth.clip import ClipSpec, clip_digest, render_clip
 from synth.errors import SynthError
@@ -23,12 +24,12 @@ from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import FarmError
 from webapp.media import MediaStore
-from webapp.models import ClipStatus
 from webapp.services import clips, studies
 from webapp.services.clips import Job, Progress
 
-UNFINISHED = (ClipStatus.PENDING, ClipStatus.RENDERING)
 POLL_SECONDS = 2.0
+MAX_PAUSE_SECONDS = 60.0
+STOP_LATENCY_SECONDS = 0.5
 CONNECT_SECONDS = 15
 
 
@@ -93,7 +94,8 @@ class Farm:
                     n_workers=self._workers,
                     threads_per_worker=1,
                     processes=True,
-                    dashboard_address=None,
+                    # Any free port, for this machine only: nobody looks at the dashboard.
+                    dashboard_address="127.0.0.1:0",
                     silence_logs=logging.CRITICAL,
                 )
             self._client = Client(self._cluster or self._settings.scheduler, timeout=CONNECT_SECONDS)
@@ -111,16 +113,45 @@ class Farm:
                 with suppress(OSError, TimeoutError):
                     part.close()
 
-    def render(self, jobs: Iterable[Job]) -> Iterator[Outcome]:
-        """Render jobs on the workers and yield each outcome as it comes."""
+    def render(self, jobs: Iterable[Job], stop: threading.Event | None = None) -> Iterator[Outcome]:
+        """Render jobs on the workers and yield each outcome as it comes; ends early when `stop` is set."""
         if self._client is None:
             raise FarmError("The farm is not open; use it in a with statement")
         place = (self._settings.media_url, str(self._settings.face_dir))
-        digests = {self._client.submit(render_job, job, *place, key=f"clip-{job.digest}"): job.digest for job in jobs}
-        for future in as_completed(list(digests)):
-            error = future.exception()
-            failed = Outcome(digests[future], error=f"The worker failed: {error}")
-            yield future.result() if error is None else failed
+        home = hashlib.sha256("|".join(place).encode()).hexdigest()[:12]
+        digests = {
+            self._client.submit(render_job, job, *place, key=f"clip-{job.digest}-{home}"): job.digest for job in jobs
+        }
+        waiting = set(digests)
+        while waiting and not (stop and stop.is_set()):
+            # Short waits, so that being told to stop does not have to wait for a clip.
+            with suppress(TimeoutError):
+                wait(waiting, timeout=STOP_LATENCY_SECONDS, return_when="FIRST_COMPLETED")
+            for future in [future for future in waiting if future.done()]:
+                waiting.remove(future)
+                yield _outcome(future, digests[future])
+
+
+def _outcome(future: Any, digest: str) -> Outcome:
+    if future.cancelled():
+        return Outcome(digest, error="The rendering was cancelled; render the clips again")
+    error = future.exception()
+    if error is None:
+        outcome: Outcome = future.result()
+        return outcome
+    return Outcome(digest, error=f"The worker failed ({error})")
+
+
+def requeue_lost(database: Database, settings: Settings) -> int:
+    """Queue again the finished clips whose files are gone, and return how many there were."""
+    store = MediaStore(settings.media_url)
+    with database.read() as session:
+        recorded = clips.done(session)
+    lost = [digest for digest in recorded if not store.has(digest)]
+    if lost:
+        with database.write() as session:
+            clips.requeue(session, lost)
+    return len(lost)
 
 
 def render_unfinished(
@@ -128,9 +159,10 @@ def render_unfinished(
     settings: Settings,
     *,
     slug: str | None = None,
-    statuses: Iterable[ClipStatus] = UNFINISHED,
+    insist: bool = False,
     workers: int | None = None,
     on_progress: Callable[[int, int], None] | None = None,
+    stop: threading.Event | None = None,
 ) -> list[Outcome]:
     """Render what is unfinished, of one study or of all, and record each clip's state as it changes.
 
@@ -138,48 +170,74 @@ def render_unfinished(
     ----------
     slug : str, optional
         Only this study's clips.
-    statuses : iterable of ClipStatus
-        Which clips to take; adding FAILED tries those again.
+    insist : bool
+        Also take what failed before, and what somebody else may be rendering just now.
     workers : int, optional
         Worker processes of the local cluster.
     on_progress : callable, optional
         Called with (finished, all) jobs, first with (0, all).
+    stop : threading.Event, optional
+        When set, ends early; what is not finished goes back into the queue.
 
     Returns
     -------
     list of Outcome
-        One for each job, in the order in which they finished.
+        One for each job that was finished, in the order in which they finished.
+
+    Raises
+    ------
+    FarmError
+        If there are no workers.
     """
-    store = MediaStore(settings.media_url)
     with database.write() as session:
-        clips.mark_pending(session, [digest for digest in clips.done(session) if not store.has(digest)])
         study = studies.find(session, slug) if slug else None
-        jobs = clips.claim(session, study, statuses=statuses)
-    outcomes: list[Outcome] = []
-
-    def record(outcome: Outcome) -> None:
-        with database.write() as session:
-            if outcome.error is None:
-                clips.mark_done(session, outcome.digest, outcome.size)
-            else:
-                clips.mark_failed(session, outcome.digest, outcome.error)
-        outcomes.append(outcome)
-        if on_progress is not None:
-            on_progress(len(outcomes), len(jobs))
-
+        jobs = clips.claim(session, study, insist=insist)
     if on_progress is not None:
         on_progress(0, len(jobs))
+    outcomes: list[Outcome] = []
+    open_digests = {job.digest for job in jobs}
+    try:
+        for outcome in _outcomes(jobs, settings, workers=workers, stop=stop):
+            open_digests.discard(outcome.digest)
+            with database.write() as session:
+                if outcome.error is None:
+                    clips.mark_done(session, outcome.digest, outcome.size)
+                else:
+                    clips.mark_failed(session, outcome.digest, outcome.error)
+                clips.renew(session, open_digests)
+            outcomes.append(outcome)
+            if on_progress is not None:
+                on_progress(len(outcomes), len(jobs))
+    finally:
+        # Interrupted, or without workers: nobody is working on these any more.
+        if open_digests:
+            with database.write() as session:
+                clips.give_back(session, open_digests)
+    return outcomes
+
+
+def _outcomes(
+    jobs: list[Job], settings: Settings, *, workers: int | None, stop: threading.Event | None
+) -> Iterator[Outcome]:
+    """Yield at once what is in the store already; open a farm only for the rest."""
+    store = MediaStore(settings.media_url)
     missing = []
     for job in jobs:
         if store.has(job.digest):
-            record(Outcome(job.digest, size=store.size(job.digest)))
+            yield Outcome(job.digest, size=store.size(job.digest))
         else:
             missing.append(job)
-    if missing:
-        with Farm(settings, workers=workers and min(workers, len(missing))) as farm:
-            for outcome in farm.render(missing):
-                record(outcome)
-    return outcomes
+    if not missing:
+        return
+    with Farm(settings, workers=min(workers or os.cpu_count() or 1, len(missing))) as farm:
+        for outcome in farm.render(missing, stop):
+            if outcome.error is None and not store.has(outcome.digest):
+                yield Outcome(
+                    outcome.digest,
+                    error="The workers write to another media store than the server's; give both one PADLAB_MEDIA_URL",
+                )
+            else:
+                yield outcome
 
 
 def progress(database: Database, slug: str) -> Progress:
@@ -189,27 +247,31 @@ def progress(database: Database, slug: str) -> Progress:
 
 
 def watch(settings: Settings, stop: threading.Event | None = None) -> None:
-    """Render whatever is or becomes pending until told to stop; the companion process of ``padlab serve``.
+    """Render whatever is or becomes pending until told to stop; the work of the server's companion process.
 
-    The first look also takes clips that a process before this one left unfinished.
+    Nothing short of being told ends it: a database or a scheduler that is away for a while is asked again later.
     """
     stop = stop or threading.Event()
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: stop.set())
-    database = Database(settings.database_url)
     parent = os.getppid()
-    statuses: tuple[ClipStatus, ...] = UNFINISHED
+    pause = POLL_SECONDS
+    database = Database(settings.database_url)
+    checked_files = False
     # A server that was killed cannot say goodbye: its companion then has another parent, and ends by itself.
     while not stop.is_set() and os.getppid() == parent:
         try:
-            render_unfinished(database, settings, statuses=statuses)
-            statuses = (ClipStatus.PENDING,)
-        except FarmError as error:
-            logging.getLogger(__name__).warning("%s", error)
-            statuses = UNFINISHED
-        stop.wait(POLL_SECONDS)
-
-
-if __name__ == "__main__":
-    watch(Settings.from_env())
+            if not checked_files:
+                requeue_lost(database, settings)
+                checked_files = True
+            with database.read() as session:
+                something = clips.unfinished(session)
+            if something:
+                render_unfinished(database, settings, stop=stop)
+            pause = POLL_SECONDS
+        except Exception:
+            logging.getLogger(__name__).exception("Rendering in the background failed; trying again in %.0f s", pause)
+            pause = min(2 * pause, MAX_PAUSE_SECONDS)
+        stop.wait(pause)
+    database.dispose()

@@ -1,6 +1,7 @@
 """Headers that every answer carries: nothing from other hosts, no inline script, no framing."""
 
-from flask import Flask, Response
+from flask import Flask, Response, request
+from flask.sessions import SecureCookieSessionInterface
 
 PAGE_POLICY = "; ".join(
     (
@@ -32,7 +33,8 @@ _HEADERS = {
 
 
 def install(app: Flask) -> None:
-    """Add the headers to every answer that does not set its own."""
+    """Add the headers to every answer that does not set its own, and keep the session's cookie to HTTPS."""
+    app.session_interface = SecureOverHttps()
 
     @app.after_request
     def add_headers(response: Response) -> Response:
@@ -46,4 +48,15 @@ def install(app: Flask) -> None:
 
 def own_path(target: str | None) -> str | None:
     """Return `target` when it is a path of this site, otherwise None: two slashes lead to another host."""
-    return target if target and target.startswith("/") and not target.startswith(("//", "/\\")) else None
+    if not target or not target.startswith("/") or target.startswith("//"):
+        return None
+    # Browsers take a backslash for a slash, and drop tabs and line ends before they look.
+    return None if any(char in "\\\x7f" or char <= " " for char in target) else target
+
+
+class SecureOverHttps(SecureCookieSessionInterface):
+    """A session whose cookie is for HTTPS only, as soon as the page came over HTTPS."""
+
+    def get_cookie_secure(self, app: Flask) -> bool:
+        """Tell whether the present request came over HTTPS."""
+        return request.is_secure

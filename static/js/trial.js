@@ -51,8 +51,13 @@
     }
   });
   clip.addEventListener("ended", () => {
+    const first = !watched;
     watched = true;
     open();
+    // The button that was pressed has changed its place: keyboards and screen readers go on with the questions.
+    if (first) {
+      questions.focus({ preventScroll: true });
+    }
   });
   // A tab in the background may pause the clip before its end: offer the button again.
   clip.addEventListener("pause", () => { play.hidden = false; });
@@ -81,7 +86,9 @@
       for (const name of left) {
         form.querySelector(`input[name="${CSS.escape(name)}"]`).closest(".item").classList.add("has-problem");
       }
-      form.querySelector(".has-problem")?.scrollIntoView({ block: "center", behavior: "smooth" });
+      const missing = form.querySelector(".has-problem");
+      missing?.scrollIntoView({ block: "center", behavior: "smooth" });
+      missing?.querySelector("input").focus({ preventScroll: true });
       return;
     }
     sent = true;

@@ -1,17 +1,19 @@
 import re
 import signal
 import socket
+import time
 import urllib.request
 from http.cookiejar import CookieJar
+from pathlib import Path
 from urllib.parse import urlencode
 
 import pytest
 from sqlalchemy import select
 
 from evaluation import instruments
-from serving import Server, padlab
+from serving import Server, padlab, processes_below, wait_until
 from webapp.db import Database
-from webapp.models import Response
+from webapp.models import Clip, Response
 
 
 class Person:
@@ -60,3 +62,30 @@ def test_a_port_in_use_gives_one_sentence(mini: str, environment: dict[str, str]
             done = padlab(command, "--port", port, environment=environment)
             assert done.returncode == 1
             assert re.fullmatch(rf"Error: padlab cannot listen on 127\.0\.0\.1, port {port} .*--port.*\n", done.stderr)
+
+
+def test_stopping_while_clips_are_rendered_is_quick_and_leaves_nobody_behind(
+    mini: str, database: Database, environment: dict[str, str], tmp_path: Path
+) -> None:
+    with Server({**environment, "PADLAB_MEDIA_URL": str(tmp_path / "empty")}) as server:
+        # The store is another one, so all clips are lost and rendered again.
+        wait_until(lambda: _states(database) != {"done"})
+        group = server.process_group
+        began = time.monotonic()
+        server.stop(signal.SIGTERM)
+        assert time.monotonic() - began < 25
+    wait_until(lambda: not processes_below(group))
+    wait_until(lambda: "rendering" not in _states(database))
+
+
+def test_no_web_process_holds_a_connection_of_its_parent(mini: str, environment: dict[str, str]) -> None:
+    with Server(environment) as server:
+        links = list(Path(f"/proc/{server.process_group}/fd").iterdir())
+        held = [str(link.readlink()) for link in links if link.is_symlink()]
+    assert held
+    assert not [name for name in held if "padlab.sqlite" in name]
+
+
+def _states(database: Database) -> set[str]:
+    with database.read() as session:
+        return set(session.scalars(select(Clip.status)))

@@ -37,6 +37,7 @@ def test_postgresql_gets_the_driver_that_is_installed(tmp_path: Path) -> None:
         ("PADLAB_DATABASE_URL", "mysql://host/padlab", "'mysql'"),
         ("PADLAB_DATABASE_URL", "sqlite://", "must outlive"),
         ("PADLAB_SCHEDULER", "cluster:8786", "tcp://host:8786"),
+        ("PADLAB_SECRET_KEY", "secret", "at least 32"),
         ("PADLAB_HOME", "/dev/null/home", "a folder you may write to"),
     ],
 )

@@ -6,6 +6,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from sqlalchemy import func, select, text
 
+from webapp.config import Settings
 from webapp.db import Base, Database
 from webapp.errors import DatabaseError
 from webapp.models import Experimenter
@@ -83,3 +84,29 @@ def test_a_server_that_does_not_answer_gives_one_sentence_without_the_password()
     with pytest.raises(DatabaseError, match="cannot be used") as error:
         Database("postgresql+psycopg://lab:geheim@127.0.0.1:1/padlab").current()
     assert "geheim" not in str(error.value)
+
+
+@pytest.mark.every_database
+def test_a_database_of_another_version_gives_one_sentence(database: Database) -> None:
+    with database.write() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = 'fromthefuture'"))
+    with pytest.raises(DatabaseError, match="another version of padlab"):
+        database.upgrade()
+
+
+@pytest.mark.every_database
+def test_two_upgrades_at_once_make_one_schema(settings: Settings) -> None:
+    made: list[str] = []
+    threads = [
+        threading.Thread(target=lambda: made.append(Database(settings.database_url).upgrade())) for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert made == [Database.head()] * 3
+
+
+def test_a_fault_while_reading_gives_one_sentence(database: Database) -> None:
+    with pytest.raises(DatabaseError, match="no such table"), database.read() as session:
+        session.execute(text("SELECT * FROM nowhere"))

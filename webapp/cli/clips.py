@@ -7,9 +7,6 @@ from webapp.cli.context import echo_json, open_database, progress_bar
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import FarmError
-from webapp.models import ClipStatus
-
-RETRY = (*farm.UNFINISHED, ClipStatus.FAILED)
 
 
 def render_clips(database: Database, settings: Settings, slug: str, *, workers: int | None = None) -> None:
@@ -21,8 +18,9 @@ def render_clips(database: Database, settings: Settings, slug: str, *, workers: 
         If clips could not be rendered; the message holds the first reason.
     """
     with progress_bar("Rendering clips") as update:
+        farm.requeue_lost(database, settings)
         outcomes = farm.render_unfinished(
-            database, settings, slug=slug, statuses=RETRY, workers=workers, on_progress=update
+            database, settings, slug=slug, insist=True, workers=workers, on_progress=update
         )
     failed = [outcome for outcome in outcomes if outcome.error]
     if failed:

@@ -1,13 +1,11 @@
 """``padlab demo``: from nothing to a served study with rendered clips."""
 
-from pathlib import Path
-
 import click
 
+from evaluation import study as study_file
 from synth.face import assets
 from webapp.cli import serve
 from webapp.cli.clips import render_clips
-from webapp.cli.study import read_study_file
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.models import StudyState
@@ -33,18 +31,19 @@ def demo(host: str, port: int, no_serve: bool) -> None:
         click.echo("Fetching the face data (48 MB, once)", err=True)
     assets.fetch(settings.face_dir)
     password = _prepare(database, settings)
-    render_clips(database, settings, SLUG)
-
-    base = f"http://{host}:{port}"
+    base = f"http://{serve.address(host, port)}"
     click.echo(f"Participants:  {base}/s/{SLUG}/")
     click.echo(f"Experimenter:  {base}/experimenter/{SLUG}/")
     if password is not None:
+        # Said before the long work: whoever interrupts that would never see it again.
         click.echo(f"               name: {EXPERIMENTER}   password (shown only now): {password}")
+    render_clips(database, settings, SLUG)
     if no_serve:
         click.echo("Everything is ready; `padlab demo` or `padlab serve` serves it.")
         return
-    click.echo("Stop with Ctrl-C; what was answered is kept.")
     database.dispose()
+    serve.check(settings)
+    click.echo(f"Ready: open {base}/s/{SLUG}/ in a browser. Stop with Ctrl-C; what was answered is kept.")
     serve.run(settings, host=host, port=port, workers=WEB_WORKERS)
 
 
@@ -54,8 +53,7 @@ def _prepare(database: Database, settings: Settings) -> str | None:
         known = {overview.slug: overview for overview in studies.overviews(session)}
         # Before anybody took part, the demo follows the code: a changed face or study file takes effect.
         if SLUG not in known or known[SLUG].participants == 0:
-            spec, text = read_study_file(Path(SLUG))
-            studies.apply(session, spec, text, settings)
+            studies.apply(session, study_file.load_bundled(SLUG), study_file.bundled_text(SLUG), settings)
         if SLUG not in known:
             studies.set_state(session, SLUG, StudyState.OPEN)
         if experimenters.any_exists(session):

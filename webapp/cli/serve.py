@@ -1,6 +1,7 @@
 """``padlab serve``: gunicorn in front, a companion process that renders behind."""
 
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -10,13 +11,13 @@ import click
 from gunicorn.app.base import BaseApplication
 
 from webapp import create_app
-from webapp.cli.context import open_database
+from webapp.application import Parts
 from webapp.config import Settings
 from webapp.errors import ConfigError
 
 THREADS = 4
 KEEPALIVE_SECONDS = 5
-STOP_SECONDS = 15
+STOP_SECONDS = 10
 
 
 class Server(BaseApplication):  # type: ignore[misc]
@@ -59,20 +60,21 @@ def require_free_port(host: str, port: int) -> None:
 
 def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
     """Serve until stopped; clips that are pending are rendered meanwhile."""
-    # A process of its own that shares nothing with the web workers; it reads the same settings.
-    renderer = subprocess.Popen([sys.executable, "-m", "webapp.farm"])
+    # A process of its own that shares nothing with the web workers, and a group of its own, so that its workers can be
+    # stopped with it; it reads the same settings.
+    renderer = subprocess.Popen([sys.executable, "-m", "webapp.cli.companion"], start_new_session=True)
     master = os.getpid()
     try:
-        bind = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
         Server(
             settings,
             {
-                "bind": bind,
+                "bind": address(host, port),
                 "workers": workers,
                 # Sync workers would wait for slow browsers to close their connections.
                 "worker_class": "gthread",
                 "threads": THREADS,
                 "keepalive": KEEPALIVE_SECONDS,
+                "graceful_timeout": STOP_SECONDS,
                 "loglevel": "warning",
                 "proc_name": "padlab",
                 "control_socket_disable": True,
@@ -81,8 +83,35 @@ def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
     finally:
         # Gunicorn's workers are forks of this process and pass here too when they end.
         if os.getpid() == master:
-            renderer.terminate()
-            renderer.wait(STOP_SECONDS)
+            _stop(renderer)
+
+
+def _stop(renderer: "subprocess.Popen[bytes]") -> None:
+    """Ask the renderer to end; what it has not finished is rendered at the next start."""
+    renderer.terminate()
+    try:
+        renderer.wait(STOP_SECONDS)
+    except subprocess.TimeoutExpired:
+        os.killpg(renderer.pid, signal.SIGKILL)
+        renderer.wait()
+
+
+def address(host: str, port: int) -> str:
+    """Return host and port as URLs write them."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def check(settings: Settings) -> None:
+    """Build the application once, so that what is wrong is said before anything is served.
+
+    Raises
+    ------
+    WebappError
+        As `webapp.create_app`.
+    """
+    parts: Parts = create_app(settings).extensions["padlab"]
+    # A connection must not be carried through gunicorn's fork: both sides would use it.
+    parts.database.dispose()
 
 
 @click.command()
@@ -92,8 +121,7 @@ def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
 def serve(host: str, port: int, workers: int) -> None:
     """Serve the pages, and render clips that are pending in the background."""
     require_free_port(host, port)
-    settings, database = open_database()
-    create_app(settings)
-    database.dispose()
-    click.echo(f"padlab listens on http://{host}:{port}/ (stop with Ctrl-C)")
+    settings = Settings.from_env()
+    check(settings)
+    click.echo(f"padlab listens on http://{address(host, port)}/ (stop with Ctrl-C)")
     run(settings, host=host, port=port, workers=workers)

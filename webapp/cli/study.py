@@ -31,7 +31,7 @@ def read_study_file(path: Path) -> tuple[StudySpec, str]:
     StudyFileError
         If the file is not a valid study file; the message names line and field.
     """
-    if not path.exists() and str(path) in study_file.bundled_names():
+    if not path.is_file() and str(path) in study_file.bundled_names():
         text = study_file.bundled_text(str(path))
         return StudySpec.from_yaml(text, source=f"{path} (bundled)"), text
     if not path.is_file():

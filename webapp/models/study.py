@@ -74,6 +74,7 @@ class Clip(Base):
     error: Mapped[str | None] = mapped_column(Text())
     bytes: Mapped[int | None]
     created_at: Mapped[Moment] = mapped_column(default=now)
+    claimed_at: Mapped[datetime | None] = mapped_column(UtcDateTime())
     finished_at: Mapped[datetime | None] = mapped_column(UtcDateTime())
 
 

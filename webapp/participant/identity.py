@@ -23,15 +23,33 @@ def remember(response: Response, slug: str, token: str) -> Response:
     return response
 
 
+def forget(response: Response, slug: str) -> Response:
+    """Let the browser forget the participant."""
+    session.pop(f"enrol_{slug}", None)
+    response.delete_cookie(_cookie(slug), path="/")
+    return response
+
+
+def expect(slug: str) -> str:
+    """Return the token with which this browser will enrol, the same however often the button is pressed."""
+    key = f"enrol_{slug}"
+    if key not in session:
+        session[key] = enrolment.new_token()
+    return str(session[key])
+
+
 def find(db: Session, slug: str) -> Participant | None:
     """Return the participant that the browser remembers, if that is one of this study."""
     token = request.cookies.get(_cookie(slug))
     if not token:
         return None
     try:
-        return enrolment.find(db, slug, token)
+        participant = enrolment.find(db, slug, token)
     except NotFoundError:
         return None
+    # On another device, or after the browser was closed, the pages go on in the language they were begun in.
+    session.setdefault("language", participant.language)
+    return participant
 
 
 def visit_id(participant: Participant) -> int:

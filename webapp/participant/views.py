@@ -64,6 +64,7 @@ def welcome(slug: str) -> Response | str:
         participant = identity.find(db, slug)
         if participant is not None:
             return _go("trial" if participant.completed_at is None else "debrief", slug)
+        identity.expect(slug)
         return _study_page("welcome.html", studies.spec_of(study), study, open=study.state == StudyState.OPEN)
 
 
@@ -78,8 +79,23 @@ def consent(slug: str) -> Response | str:
         if request.form.get("consent") != "yes":
             return _study_page("welcome.html", spec, study, open=study.state == StudyState.OPEN, problem="consent")
     with _database().write() as db:
-        participant = enrolment.enrol(db, slug, language=_language(spec))
+        participant = enrolment.enrol(db, slug, language=_language(spec), token=identity.expect(slug))
     return identity.remember(_go("instructions", slug), slug, participant.token)
+
+
+@blueprint.get("/s/<slug>/consent")
+@blueprint.get("/s/<slug>/trial/<int:position>")
+def again(slug: str, position: int = 0) -> Response:
+    """Lead an address that only takes forms (loaded again, or after a change of language) to the page it belongs to."""
+    return _go("welcome", slug)
+
+
+@blueprint.post("/s/<slug>/leave")
+def leave(slug: str) -> Response:
+    """Forget who sits at this browser, so that somebody else can begin; answers stay."""
+    with _database().read() as db:
+        studies.find(db, slug)
+    return identity.forget(_go("welcome", slug), slug)
 
 
 @blueprint.get("/s/<slug>/resume/<token>")
@@ -107,7 +123,6 @@ def instructions(slug: str) -> Response | str:
             study,
             personal_link=link,
             trial_count=trials.count(db, participant),
-            clip_progress=clips.progress(db, study),
         )
 
 
@@ -118,13 +133,15 @@ def trial(slug: str) -> Response | str:
         participant = identity.find(db, slug)
         if participant is None:
             return _go("welcome", slug)
-    visit = identity.visit_id(participant)
-    with _database().write() as db:
-        participant = db.get_one(Participant, participant.id)
+        identity.visit_id(participant)
         current = trials.current(db, participant)
         if current is None:
             return _go("debrief", slug)
-        return _trial_page(db, participant, current, visit=visit)
+        page = _trial_page(db, participant, current)
+    if current.shown_at is None and current.stimulus.clip.status == ClipStatus.DONE:
+        with _database().write() as db:
+            trials.mark_shown(db, current.id)
+    return page
 
 
 def _trial_page(
@@ -132,7 +149,6 @@ def _trial_page(
     participant: Participant,
     current: Trial,
     *,
-    visit: int,
     given: dict[str, str] | None = None,
     problems: dict[str, str] | None = None,
 ) -> str:
@@ -140,8 +156,8 @@ def _trial_page(
     spec = studies.spec_of(study)
     clip = current.stimulus.clip
     if clip.status != ClipStatus.DONE:
-        return _study_page("waiting.html", spec, study, clip_progress=clips.progress(db, study))
-    trials.mark_shown(db, current)
+        failed = clip.status == ClipStatus.FAILED
+        return _study_page("waiting.html", spec, study, failed=failed, clip_progress=clips.progress(db, study))
     return _study_page(
         "trial.html",
         spec,
@@ -170,7 +186,7 @@ def answer(slug: str, position: int) -> Response | tuple[str, int]:
     try:
         answers = trials.validate(spec, request.form)
     except AnswersRefusedError as refused:
-        return _answer_again(participant, position, visit, refused.problems)
+        return _answer_again(slug, position, refused.problems)
     with _database().write() as db:
         following = trials.record(
             db,
@@ -183,16 +199,14 @@ def answer(slug: str, position: int) -> Response | tuple[str, int]:
     return _go("debrief" if following is None else "trial", slug)
 
 
-def _answer_again(
-    participant: Participant, position: int, visit: int, problems: dict[str, str]
-) -> Response | tuple[str, int]:
-    with _database().write() as db:
-        participant = db.get_one(Participant, participant.id)
-        current = trials.current(db, participant)
-        if current is None or current.position != position:
-            return _go("trial", participant.study.slug)
+def _answer_again(slug: str, position: int, problems: dict[str, str]) -> Response | tuple[str, int]:
+    with _database().read() as db:
+        participant = identity.find(db, slug)
+        current = trials.current(db, participant) if participant else None
+        if participant is None or current is None or current.position != position:
+            return _go("trial", slug)
         given = {name: value for name, value in request.form.items() if "." in name}
-        return _trial_page(db, participant, current, visit=visit, given=given, problems=problems), 422
+        return _trial_page(db, participant, current, given=given, problems=problems), 422
 
 
 def _playback(text: str) -> list[Playback]:

@@ -13,8 +13,21 @@ from webapp.services import studies
 USER_AGENT_LENGTH = 400
 
 
-def enrol(session: Session, slug: str, *, language: str) -> Participant:
+def new_token() -> str:
+    """Return a new secret by which a participant is recognised."""
+    return secrets.token_urlsafe(24)
+
+
+def enrol(session: Session, slug: str, *, language: str, token: str | None = None) -> Participant:
     """Enrol a person who consented, and lay out all trials in the order that the study file and its seed fix.
+
+    Parameters
+    ----------
+    language : str
+        The language the person reads, as in the study file.
+    token : str, optional
+        The person's secret (see `new_token`). Enrolling again with the same one changes nothing: whoever presses the
+        button twice is one participant.
 
     Raises
     ------
@@ -27,10 +40,14 @@ def enrol(session: Session, slug: str, *, language: str) -> Participant:
     study = session.scalar(select(Study).where(Study.slug == slug).with_for_update())
     if study is None:
         study = studies.find(session, slug)
+    token = token or new_token()
+    enrolled = session.scalar(select(Participant).where(Participant.study_id == study.id, Participant.token == token))
+    if enrolled is not None:
+        return enrolled
     if study.state != StudyState.OPEN:
         raise ConflictError(f"The study '{slug}' is not open")
     number = session.scalar(select(func.count(Participant.id)).where(Participant.study_id == study.id)) or 0
-    participant = Participant(study=study, number=number, token=secrets.token_urlsafe(24), language=language)
+    participant = Participant(study=study, number=number, token=token, language=language)
     by_cell = {
         (stimulus.name, stimulus.condition.name): stimulus
         for stimulus in session.scalars(select(Stimulus).where(Stimulus.study_id == study.id))

@@ -6,7 +6,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 from werkzeug.security import check_password_hash, generate_password_hash
 
-from webapp.errors import ConflictError
+from webapp.errors import ConflictError, NotFoundError
 from webapp.models import Experimenter
 
 ROLES = ("admin", "experimenter")
@@ -23,16 +23,39 @@ def add(session: Session, name: str, password: str, *, role: str = "experimenter
     ConflictError
         If the name is taken or the password too short.
     """
-    if len(password) < MIN_PASSWORD_LENGTH:
-        raise ConflictError(f"The password is too short; it takes at least {MIN_PASSWORD_LENGTH} characters")
+    hashed = _hash(password)
     if not name or len(name) > 80:
         raise ConflictError("An experimenter's name takes 1 to 80 characters")
     if session.scalar(select(Experimenter).where(Experimenter.name == name)) is not None:
-        raise ConflictError(f"There is an experimenter '{name}' already; choose another name")
-    experimenter = Experimenter(name=name, password_hash=generate_password_hash(password), role=role)
+        raise ConflictError(
+            f"There is an experimenter '{name}' already; choose another name, or run `padlab user password {name}`"
+        )
+    experimenter = Experimenter(name=name, password_hash=hashed, role=role)
     session.add(experimenter)
     session.flush()
     return experimenter
+
+
+def set_password(session: Session, name: str, password: str) -> None:
+    """Give an account a new password.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such account.
+    ConflictError
+        If the password is too short.
+    """
+    experimenter = session.scalar(select(Experimenter).where(Experimenter.name == name))
+    if experimenter is None:
+        raise NotFoundError(f"There is no experimenter '{name}'; `padlab user add {name}` makes one")
+    experimenter.password_hash = _hash(password)
+
+
+def _hash(password: str) -> str:
+    if len(password) < MIN_PASSWORD_LENGTH:
+        raise ConflictError(f"The password is too short; it takes at least {MIN_PASSWORD_LENGTH} characters")
+    return generate_password_hash(password)
 
 
 def any_exists(session: Session) -> bool:

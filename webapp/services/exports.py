@@ -24,8 +24,13 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
         "responses": export.responses(spec, answered),
         "scores": export.scores(spec, answered),
         "trials": results.trials(session, slug),
-        "codebook": export.codebook(spec),
+        "codebook": pd.concat([export.codebook(spec), _trial_codebook()], ignore_index=True),
     }
+
+
+def _trial_codebook() -> pd.DataFrame:
+    rows = [(f"trials.{name}", text, "", "", "padlab") for name, text in results.TRIAL_COLUMNS.items()]
+    return pd.DataFrame(rows, columns=["variable", "text", "values", "scoring", "source"])
 
 
 def to_csv(frame: pd.DataFrame) -> str:

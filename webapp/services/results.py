@@ -8,6 +8,20 @@ from evaluation.report.analysis import RESPONSE_COLUMNS, StudyReport, analyse
 from webapp.models import Condition, Participant, PlaybackEvent, Response, Stimulus, Trial
 from webapp.services import studies
 
+TRIAL_COLUMNS = {
+    "participant": "number of the participant, counted from 1 in the order of enrolment",
+    "trial": "place of the trial in the participant's order, counted from 1",
+    "stimulus": "what was shown",
+    "condition": "in which condition",
+    "clip": "sha-256 of all that made the clip; leads to its lineage in the media store",
+    "language": "language of the pages",
+    "consented_at": "when the participant agreed (UTC)",
+    "shown_at": "when the trial was first on the screen (UTC); empty if not yet",
+    "answered_at": "when its answers were stored (UTC); empty if not yet",
+    "plays": "how often the clip was played to its end",
+}
+"""The columns of `trials` and what they mean."""
+
 
 def responses(session: Session, slug: str) -> pd.DataFrame:
     """Return all counting answers of a study, one row for each item (the last revision of each).
@@ -33,7 +47,7 @@ def responses(session: Session, slug: str) -> pd.DataFrame:
         .join(Stimulus, Trial.stimulus_id == Stimulus.id)
         .join(Condition, Stimulus.condition_id == Condition.id)
         .where(Participant.study_id == study.id)
-        .order_by(Participant.number, Trial.position, Response.id)
+        .order_by(Participant.number, Trial.position, Response.revision, Response.id)
     )
     # Later revisions come later and replace the earlier ones.
     counting = {(row[0], row[1], row[4]): row for row in rows}
@@ -90,5 +104,6 @@ def trials(session: Session, slug: str) -> pd.DataFrame:
                 "plays": int(plays.get(trial.id, 0)),
             }
             for trial, participant, stimulus in rows
-        ]
+        ],
+        columns=list(TRIAL_COLUMNS),
     )

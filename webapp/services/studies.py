@@ -45,6 +45,12 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
         raise ConflictError(
             f"The study '{spec.slug}' has participants and cannot be changed; give the changed file a new slug"
         )
+    wanted = {cell: clip_spec(spec, *cell) for cell in spec.cells()}
+    digests = {cell: clip_digest(clip, settings.face_dir) for cell, clip in wanted.items()}
+    if study is not None and study.digest == spec.digest:
+        applied = [stimulus.clip.digest for stimulus in study.stimuli]
+        if applied == list(digests.values()):
+            return study
     if study is None:
         study = Study(slug=spec.slug)
         session.add(study)
@@ -56,9 +62,10 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
     session.flush()
     study.conditions = [Condition(name=condition.name, position=k) for k, condition in enumerate(spec.conditions)]
     by_name = {condition.name: condition for condition in study.conditions}
-    for stimulus, condition in spec.cells():
-        clip = _clip(session, clip_spec(spec, stimulus, condition), settings)
-        study.stimuli.append(Stimulus(name=stimulus, condition=by_name[condition], clip=clip))
+    for cell, clip in wanted.items():
+        study.stimuli.append(
+            Stimulus(name=cell.stimulus, condition=by_name[cell.condition], clip=_clip(session, clip, digests[cell]))
+        )
     session.flush()
     return study
 
@@ -74,8 +81,7 @@ def clip_spec(spec: StudySpec, stimulus: str, condition: str) -> ClipSpec:
     return ClipSpec.from_dict(spec.clip_fields(stimulus, condition))
 
 
-def _clip(session: Session, spec: ClipSpec, settings: Settings) -> Clip:
-    digest = clip_digest(spec, settings.face_dir)
+def _clip(session: Session, spec: ClipSpec, digest: str) -> Clip:
     clip = session.scalar(select(Clip).where(Clip.digest == digest))
     if clip is None:
         clip = Clip(digest=digest, spec=spec.to_dict())

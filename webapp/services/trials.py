@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session, joinedload
 
 from evaluation import instruments
@@ -55,10 +55,9 @@ def count(session: Session, participant: Participant) -> int:
     return session.scalar(select(func.count(Trial.id)).where(Trial.participant_id == participant.id)) or 0
 
 
-def mark_shown(session: Session, trial: Trial) -> None:
+def mark_shown(session: Session, trial_id: int) -> None:
     """Record when a trial was first on the screen."""
-    if trial.shown_at is None:
-        trial.shown_at = now()
+    session.execute(update(Trial).where(Trial.id == trial_id, Trial.shown_at.is_(None)).values(shown_at=now()))
 
 
 def validate(spec: StudySpec, form: Mapping[str, str]) -> dict[str, dict[str, int]]:

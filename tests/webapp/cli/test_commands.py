@@ -183,7 +183,9 @@ def test_accounts(run: object, database: object) -> None:
     made = run("user", "add", "wu")
     assert re.search(r"Password \(shown only now\): \S{16,}", made.output)
     assert run("user", "add", "li", "--password-stdin", "--role", "admin", stdin="a long password\n").exit_code == 0
-    _fails(run("user", "add", "wu"), "already")
+    _fails(run("user", "add", "wu"), "already", "padlab user password wu")
+    assert run("user", "password", "wu", "--password-stdin", stdin="another password\n").exit_code == 0
+    _fails(run("user", "password", "nobody"), "padlab user add nobody")
     _fails(run("user", "add", "ma", "--password-stdin", stdin="short\n"), "at least")
 
 

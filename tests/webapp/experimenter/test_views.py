@@ -1,12 +1,13 @@
 import csv
 import io
+import re
 import zipfile
 from typing import Any
 
 import pytest
 
 pytestmark = pytest.mark.usefixtures("experimenter")
-PAGES = ("", "mini/", "mini/clips.json", "mini/report.html", "mini/export.zip", "mini/figures/mos.svg")
+PAGES = ("", "mini/", "mini/clips.json", "mini/report.html", "mini/export.zip", "mini/figures/mos_by_condition.svg")
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -61,8 +62,6 @@ def test_figures_are_drawn(browser: Any, answers: dict[str, str]) -> None:
         browser.send(f"/s/mini/trial/{position}", answers)
     browser.log_in()
     browser.open("/experimenter/mini/")
-    import re
-
     addresses = re.findall(r'src="(/experimenter/mini/figures/[^"]+)"', browser.text)
     assert addresses
     for address in addresses:

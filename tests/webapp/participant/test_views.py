@@ -6,7 +6,7 @@ from flask import Flask
 from sqlalchemy import select
 
 from webapp.db import Database
-from webapp.models import Clip, ClipStatus, PlaybackEvent, Response, StudyState, Visit
+from webapp.models import Clip, ClipStatus, Participant, PlaybackEvent, Response, StudyState, Visit
 from webapp.services import studies
 
 
@@ -121,7 +121,7 @@ def test_the_language_form_leads_to_no_other_site(browser: Any) -> None:
     browser.open("/")
     token = re.search(r'name="csrf_token" value="([^"]+)"', browser.text)
     assert token is not None
-    for target in ("https://example.org/", "//example.org/", "/\\example.org"):
+    for target in ("https://example.org/", "//example.org/", "/\\example.org", "/\t/example.org", "/\n/example.org"):
         answer = browser.client.post("/language", data={"csrf_token": token[1], "language": "en", "next": target})
         assert answer.headers["Location"] == "/"
 
@@ -182,3 +182,60 @@ def test_clips_can_be_read_in_parts(browser: Any) -> None:
     assert part.status_code == 206
     assert part.data == b"ftyp"
     assert part.mimetype == "video/mp4"
+
+
+def test_whoever_presses_the_button_twice_is_one_participant(browser: Any, database: Database) -> None:
+    browser.open("/s/mini/")
+    token = re.search(r'name="csrf_token" value="([^"]+)"', browser.text)
+    assert token is not None
+    for _ in range(2):
+        browser.client.post("/s/mini/consent", data={"csrf_token": token[1], "consent": "yes"})
+        browser.client.delete_cookie("padlab_mini")
+    assert _count(database, Participant) == 1
+
+
+def test_the_next_person_at_the_computer_begins_anew(browser: Any, answers: dict[str, str], database: Database) -> None:
+    browser.enrol()
+    for position in range(1, 5):
+        browser.send(f"/s/mini/trial/{position}", answers)
+    browser.send("/s/mini/leave")
+    assert "Welcome to the small study." in browser.text
+    browser.send("/s/mini/consent", {"consent": "yes"})
+    assert _count(database, Participant) == 2
+
+
+def test_addresses_of_forms_can_be_loaded_again(browser: Any) -> None:
+    assert "Welcome" in browser.open("/s/mini/consent").get_data(as_text=True)
+    browser.enrol()
+    assert "Clip 1 of 4" in browser.open("/s/mini/trial/1").get_data(as_text=True)
+
+
+def test_the_language_goes_along_to_another_device(app: Flask, browser: Any) -> None:
+    browser.open("/s/mini/", headers={"Accept-Language": "zh"})
+    token = re.search(r'name="csrf_token" value="([^"]+)"', browser.text)
+    assert token is not None
+    browser.client.post(
+        "/s/mini/consent", data={"csrf_token": token[1], "consent": "yes"}, headers={"Accept-Language": "zh"}
+    )
+    cookie = browser.client.get_cookie("padlab_mini")
+    with app.test_client() as later:
+        later.set_cookie("padlab_mini", cookie.value)
+        page = later.get("/s/mini/trial", headers={"Accept-Language": "en"}).get_data(as_text=True)
+    assert "第 1 段，共 4 段" in page
+
+
+def test_a_clip_that_failed_is_not_waited_for(browser: Any, database: Database) -> None:
+    with database.write() as session:
+        for clip in session.scalars(select(Clip)):
+            clip.status = ClipStatus.FAILED
+    browser.enrol()
+    assert "could not be prepared" in browser.text
+    assert "http-equiv" not in browser.text
+
+
+@pytest.mark.parametrize(("scheme", "kept"), [("http", False), ("https", True)])
+def test_cookies_are_for_https_only_when_the_page_is(app: Flask, scheme: str, kept: bool) -> None:
+    with app.test_client() as client:
+        cookies = client.get("/s/mini/", headers={"X-Forwarded-Proto": scheme}).headers.getlist("Set-Cookie")
+    assert cookies
+    assert all(("Secure" in cookie) == kept for cookie in cookies)
