@@ -61,6 +61,6 @@ $(STAMPS)/translations: $(CATALOGUES) $(STAMPS)/python
 	@touch $@
 
 # The command checks what is there and returns at once when it is sound; the stamp follows the code that compiles it.
-$(STAMPS)/face: synth/face/assets.py synth/face/mesh.py $(STAMPS)/python
+$(STAMPS)/face: synth/face/assets.py synth/face/compilation.py $(STAMPS)/python
 	@$(BIN)/padlab assets fetch
 	@touch $@

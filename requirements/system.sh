@@ -26,7 +26,7 @@ line="apt-get update && apt-get install -y --no-install-recommends$missing"
 if [ "$(id -u)" = 0 ]; then
   as_root=
 elif sudo -n true 2>/dev/null; then
-  as_root="sudo -n"
+  as_root="sudo -n env DEBIAN_FRONTEND=noninteractive"
 else
   echo "These system packages are missing:$missing. Run this line, then make again:" >&2
   echo "  sudo sh -c '$line'" >&2
@@ -37,7 +37,7 @@ export DEBIAN_FRONTEND=noninteractive
 log=$(mktemp)
 if ! { $as_root apt-get update -qq && $as_root apt-get install -y -qq --no-install-recommends $missing; } >"$log" 2>&1; then
   tail -n 5 "$log" >&2
-  echo "System packages could not be installed; run this line yourself, then make again: $line" >&2
+  echo "System packages could not be installed; run this line yourself, then make again: sudo sh -c '$line'" >&2
   exit 1
 fi
 rm -f "$log"

@@ -30,7 +30,6 @@ MIN_SIZE, MAX_SIZE = 16, 4096
 
 _INSTALL = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 _FIELD_OF_VIEW = np.radians(20.0)
-_FLOATS = ctypes.sizeof(ctypes.c_float)
 
 
 class Renderer:
@@ -157,10 +156,14 @@ def _current() -> Iterator["_Graphics"]:
         graphics = _graphics()
         try:
             graphics.platform.make_current()
+            graphics.users += 1
             try:
                 yield graphics
             finally:
-                graphics.release()
+                graphics.users -= 1
+                # The collector may free a renderer in the midst of another one's drawing, which must keep the context.
+                if not graphics.users:
+                    graphics.release()
         except graphics.failures as error:
             what = str(error).strip().splitlines()
             raise RenderError(f"OpenGL failed while drawing ({what[0] if what else type(error).__name__}).") from error
@@ -196,6 +199,7 @@ class _Graphics:
     """The process's OpenGL context, and pyrender on it."""
 
     def __init__(self) -> None:
+        self.users = 0
         name = _choose_platform()
         os.environ["PYOPENGL_PLATFORM"] = name
         # pyrender's viewer would load pyglet, which wants a display; pyrender 0.1.45 still says np.infty.

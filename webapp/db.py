@@ -107,6 +107,8 @@ class Database:
             If the database cannot be opened, or its revision is not the newest.
         """
         current = self.current()
+        if current is not None and current not in _known_revisions():
+            raise self._newer(f"schema revision {current}")
         if current != self.head():
             have = "is empty" if current is None else f"has schema revision {current}"
             raise DatabaseError(
@@ -116,6 +118,11 @@ class Database:
     def dispose(self) -> None:
         """Close all pooled connections, for instance before a fork."""
         self.engine.dispose()
+
+
+def _known_revisions() -> set[str]:
+    scripts = ScriptDirectory.from_config(_alembic_config())
+    return {script.revision for script in scripts.walk_revisions()}
 
 
 def _shown(url: str) -> str:

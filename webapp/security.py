@@ -1,6 +1,6 @@
 """Headers that every answer carries: nothing from other hosts, no inline script, no framing."""
 
-from flask import Flask, Response, request
+from flask import Flask, Response, abort, request
 from flask.sessions import SecureCookieSessionInterface
 
 PAGE_POLICY = "; ".join(
@@ -35,6 +35,12 @@ _HEADERS = {
 def install(app: Flask) -> None:
     """Add the headers to every answer that does not set its own, and keep the session's cookie to HTTPS."""
     app.session_interface = SecureOverHttps()
+
+    @app.before_request
+    def refuse_nul() -> None:
+        # No text of ours has one, and PostgreSQL stores none.
+        if any("\0" in text for text in (request.path, *request.values.values())):
+            abort(400)
 
     @app.after_request
     def add_headers(response: Response) -> Response:

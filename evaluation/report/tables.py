@@ -165,7 +165,8 @@ def _reverse_evaluation(report: StudyReport) -> Section:
         tuple(rows),
         (
             "Pearson correlation over the stimuli (n), each with its mean over raters, as in Jia et al. (2013), "
-            "Table 8. A slope below 1 means that people see less than was put in.",
+            "Table 8. The input is the PAD that the study file gives for the stimulus, before a condition changes the "
+            "clip (its intensity, for instance): a slope below 1 means that people see less than that.",
             *dict.fromkeys(reasons),
         ),
     )

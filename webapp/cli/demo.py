@@ -31,7 +31,7 @@ def demo(host: str, port: int, no_serve: bool) -> None:
         click.echo("Fetching the face data (48 MB, once)", err=True)
     assets.fetch(settings.face_dir)
     password = _prepare(database, settings)
-    base = f"http://{serve.address(host, port)}"
+    base = serve.url(host, port)
     click.echo(f"Participants:  {base}/s/{SLUG}/")
     click.echo(f"Experimenter:  {base}/experimenter/{SLUG}/")
     if password is not None:

@@ -18,6 +18,7 @@ from webapp.errors import ConfigError
 THREADS = 4
 KEEPALIVE_SECONDS = 5
 STOP_SECONDS = 10
+EVERYWHERE = ("0.0.0.0", "::")  # noqa: S104  (compared with, not listened on)
 
 
 class Server(BaseApplication):  # type: ignore[misc]
@@ -97,8 +98,13 @@ def _stop(renderer: "subprocess.Popen[bytes]") -> None:
 
 
 def address(host: str, port: int) -> str:
-    """Return host and port as URLs write them."""
+    """Return host and port as addresses write them."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def url(host: str, port: int) -> str:
+    """Return an address that a browser on this machine can open."""
+    return f"http://{address('localhost' if host in EVERYWHERE else host, port)}"
 
 
 def check(settings: Settings) -> None:
@@ -123,5 +129,5 @@ def serve(host: str, port: int, workers: int) -> None:
     require_free_port(host, port)
     settings = Settings.from_env()
     check(settings)
-    click.echo(f"padlab listens on http://{address(host, port)}/ (stop with Ctrl-C)")
+    click.echo(f"padlab listens on {url(host, port)}/ (stop with Ctrl-C)")
     run(settings, host=host, port=port, workers=workers)

@@ -84,7 +84,7 @@ def consent(slug: str) -> Response | str:
 
 
 @blueprint.get("/s/<slug>/consent")
-@blueprint.get("/s/<slug>/trial/<int:position>")
+@blueprint.get("/s/<slug>/trial/<int(max=100000):position>")
 def again(slug: str, position: int = 0) -> Response:
     """Lead an address that only takes forms (loaded again, or after a change of language) to the page it belongs to."""
     return _go("welcome", slug)
@@ -174,7 +174,7 @@ def _trial_page(
     )
 
 
-@blueprint.post("/s/<slug>/trial/<int:position>")
+@blueprint.post("/s/<slug>/trial/<int(max=100000):position>")
 def answer(slug: str, position: int) -> Response | tuple[str, int]:
     """Store a trial's answers; the next trial is shown only when they are on disk."""
     with _database().read() as db:
