@@ -28,6 +28,10 @@ BACKGROUND = (0.800, 0.815, 0.830)
 
 MIN_SIZE, MAX_SIZE = 16, 4096
 
+_ADVICE = {
+    "egl": "run `apt-get install --reinstall libegl1 libgl1 libgl1-mesa-dri`",
+    "osmesa": "run `apt-get install libosmesa6`, or unset PYOPENGL_PLATFORM",
+}
 _INSTALL = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 _FIELD_OF_VIEW = np.radians(20.0)
 
@@ -212,7 +216,7 @@ class _Graphics:
             self._start(name)
         except Exception as error:
             raise RenderError(
-                f"OpenGL could not start by {name.upper()} ({type(error).__name__}: {error}); run `{_INSTALL}`."
+                f"OpenGL could not start by {name.upper()} ({type(error).__name__}: {error}); {_ADVICE[name]}."
             ) from error
 
     def _start(self, name: str) -> None:

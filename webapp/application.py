@@ -98,6 +98,9 @@ def _install_error_pages(app: Flask) -> None:
 
     @app.errorhandler(CSRFError)
     def forged(error: CSRFError) -> tuple[str, int]:
+        # Over HTTPS the form's page must have the address that the server thinks it has: a matter of the proxy.
+        if "referrer" in str(error.description):
+            app.logger.error("A form was refused: %s Does the proxy pass on Host?", error.description)
         return page(400, "csrf")
 
     @app.errorhandler(HTTPException)

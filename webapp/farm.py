@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from distributed import Client, LocalCluster, wait
+from distributed import Client, KilledWorker, LocalCluster, wait
 
 from synth.clip import ClipSpec, clip_digest, render_clip
 from synth.errors import SynthError
@@ -105,6 +105,10 @@ class Farm:
             raise FarmError(
                 f"The Dask scheduler {place} does not answer; start it or correct PADLAB_SCHEDULER"
             ) from error
+        except BaseException:
+            # Interrupted while the workers were starting: they must not be left behind.
+            self.__exit__()
+            raise
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -136,6 +140,10 @@ def _outcome(future: Any, digest: str) -> Outcome:
     if future.cancelled():
         return Outcome(digest, error="The rendering was cancelled; render the clips again")
     error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Outcome(
+            digest, error="The rendering process was ended again and again, perhaps for lack of memory; try --workers 1"
+        )
     if error is None:
         outcome: Outcome = future.result()
         return outcome
@@ -246,21 +254,26 @@ def progress(database: Database, slug: str) -> Progress:
         return clips.progress(session, studies.find(session, slug))
 
 
-def watch(settings: Settings, stop: threading.Event | None = None) -> None:
+def watch(settings: Settings, stop: threading.Event | None = None, *, parent: int | None = None) -> None:
     """Render whatever is or becomes pending until told to stop; the work of the server's companion process.
 
-    Nothing short of being told ends it: a database or a scheduler that is away for a while is asked again later.
+    A database or a scheduler that is away for a while does not end it, but is asked again later.
+
+    Parameters
+    ----------
+    stop : threading.Event, optional
+        Set to end it; in the main thread, SIGTERM and SIGINT end it too.
+    parent : int, optional
+        Process of the server. One that was killed cannot say goodbye: its companion ends when it has another parent.
     """
     stop = stop or threading.Event()
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: stop.set())
-    parent = os.getppid()
     pause = POLL_SECONDS
     database = Database(settings.database_url)
     checked_files = False
-    # A server that was killed cannot say goodbye: its companion then has another parent, and ends by itself.
-    while not stop.is_set() and os.getppid() == parent:
+    while not stop.is_set() and parent in {None, os.getppid()}:
         try:
             if not checked_files:
                 requeue_lost(database, settings)

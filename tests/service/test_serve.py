@@ -46,7 +46,9 @@ def test_an_acknowledged_answer_survives_the_death_of_the_server(
         person.open("/s/mini/consent", {"consent": "yes"})
         person.open("/s/mini/trial")
         assert "Clip 2 of 4" in person.open("/s/mini/trial/1", form)
+        family = processes_below(server.process_group)
         server.stop(signal.SIGKILL)
+        wait_until(lambda: not any(Path(f"/proc/{process}").exists() for process in family))
         with database.read() as session:
             assert [response.instrument for response in session.scalars(select(Response))] == ["pad12", "mos5"]
         server.start()

@@ -63,8 +63,9 @@ def run(settings: Settings, *, host: str, port: int, workers: int) -> None:
     """Serve until stopped; clips that are pending are rendered meanwhile."""
     # A process of its own that shares nothing with the web workers, and a group of its own, so that its workers can be
     # stopped with it; it reads the same settings.
-    renderer = subprocess.Popen([sys.executable, "-m", "webapp.cli.companion"], start_new_session=True)
     master = os.getpid()
+    command = [sys.executable, "-m", "webapp.cli.companion", str(master)]
+    renderer = subprocess.Popen(command, start_new_session=True)  # noqa: S603  (the command is our own)
     try:
         Server(
             settings,

@@ -50,9 +50,8 @@ def study() -> None:
 @click.argument("file", type=FILE)
 def validate(file: Path) -> None:
     """Check a study FILE (or the name of a bundled one) without changing anything."""
-    spec, _ = read_study_file(file)
-    for stimulus, condition in spec.cells():
-        studies.clip_spec(spec, stimulus, condition)
+    spec, text = read_study_file(file)
+    studies.clip_specs(spec, text, source=str(file))
     click.echo(
         f"{file} is a valid study file: '{spec.slug}', {len(spec.stimuli)} stimuli in "
         f"{len(spec.conditions)} conditions, {len(spec.cells())} clips."
@@ -64,6 +63,7 @@ def validate(file: Path) -> None:
 def apply(file: Path) -> None:
     """Bring a study FILE (or a bundled one) into the database; then render its clips and open it."""
     spec, text = read_study_file(file)
+    studies.clip_specs(spec, text, source=str(file))
     settings, database = open_database()
     with database.write() as session:
         slug = studies.apply(session, spec, text, settings).slug

@@ -39,11 +39,11 @@ def _face_dir() -> Path:
     return folder
 
 
-def _check_out(out: Path, suffix: str) -> None:
+def _check_out(out: Path, suffix: str, *, option: str = "--out") -> None:
     if out.suffix.lower() != suffix:
-        raise click.BadParameter(f"'{out}' must end with {suffix}", param_hint="--out")
+        raise click.BadParameter(f"'{out}' must end with {suffix}", param_hint=option)
     if not out.resolve().parent.is_dir():
-        raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with --out")
+        raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with {option}")
 
 
 @click.command(context_settings=NEGATIVE_NUMBERS)
@@ -98,6 +98,8 @@ def say(
 ) -> None:
     """Make a clip that is as long as TEXT takes to say, with the expression of the emotion --pad."""
     _check_out(out, ".mp4")
+    if lineage is not None:
+        _check_out(lineage, ".json", option="--lineage")
     neutral = face_model == "neutral"
     spec = ClipSpec(
         text=text,

@@ -41,7 +41,8 @@ def expect(slug: str) -> str:
 def find(db: Session, slug: str) -> Participant | None:
     """Return the participant that the browser remembers, if that is one of this study."""
     token = request.cookies.get(_cookie(slug))
-    if not token:
+    # A cookie may hold anything, even characters that PostgreSQL refuses to look up.
+    if not token or not token.isascii() or not token.isprintable():
         return None
     try:
         participant = enrolment.find(db, slug, token)

@@ -17,6 +17,7 @@ from webapp.services import clips, enrolment, studies, trials
 from webapp.services.trials import AnswersRefusedError, Playback
 
 blueprint = Blueprint("participant", __name__)
+MAX_PLAYBACK_LENGTH = 20_000
 
 
 def _database() -> Database:
@@ -212,13 +213,13 @@ def _answer_again(slug: str, position: int, problems: dict[str, str]) -> Respons
 def _playback(text: str) -> list[Playback]:
     """Read the page's log of the video element; a log that makes no sense is dropped, the answers are not."""
     try:
-        events = json.loads(text or "[]")
+        events = json.loads(text[:MAX_PLAYBACK_LENGTH] or "[]")
         return [
             Playback(str(kind), int(page_ms), float(media_s))
             for kind, page_ms, media_s in events[: trials.MAX_PLAYBACK_EVENTS]
             if kind in trials.PLAYBACK_KINDS and 0 <= page_ms < 2**31 and 0 <= media_s < 1e6
         ]
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, OverflowError, RecursionError):
         return []
 
 

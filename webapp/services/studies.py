@@ -1,13 +1,19 @@
 """Studies: apply a study file, open and close, look up."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from evaluation.study import StudySpec
+from evaluation import located_yaml
+from evaluation.errors import Problem, StudyFileError
+from evaluation.study import Cell, StudySpec
 from synth.clip import ClipSpec, clip_digest
+from synth.errors import SpecError, SynthError
+from synth.face.identity import IDENTITIES
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError
 from webapp.models import Clip, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
@@ -35,8 +41,8 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
     ------
     ConflictError
         If the file differs from the applied one and participants have enrolled.
-    SynthError
-        If a clip of the file cannot be specified.
+    StudyFileError
+        If a clip of the file cannot be made.
     """
     study = session.scalar(select(Study).where(Study.slug == spec.slug).with_for_update())
     if study is not None and _enrolled(session, study):
@@ -45,7 +51,7 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
         raise ConflictError(
             f"The study '{spec.slug}' has participants and cannot be changed; give the changed file a new slug"
         )
-    wanted = {cell: clip_spec(spec, *cell) for cell in spec.cells()}
+    wanted = clip_specs(spec, text, source=spec.slug)
     digests = {cell: clip_digest(clip, settings.face_dir) for cell, clip in wanted.items()}
     if study is not None and study.digest == spec.digest:
         applied = [stimulus.clip.digest for stimulus in study.stimuli]
@@ -70,15 +76,51 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
     return study
 
 
-def clip_spec(spec: StudySpec, stimulus: str, condition: str) -> ClipSpec:
-    """Return the specification of the clip that shows `stimulus` in `condition`.
+def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dict[Cell, ClipSpec]:
+    """Return the specification of the clip of each stimulus in each condition.
+
+    Parameters
+    ----------
+    spec : StudySpec
+        The study.
+    text : str
+        The text of its file, in which faults are located.
+    source : str
+        Name of the file, for messages.
 
     Raises
     ------
-    SynthError
-        If the study file asks for what synthesis cannot do; the message names the field.
+    StudyFileError
+        If the file asks for what synthesis cannot do; the message names each fault's line and field.
     """
-    return ClipSpec.from_dict(spec.clip_fields(stimulus, condition))
+    stimuli = {stimulus.id: ("stimuli", k, "clip") for k, stimulus in enumerate(spec.stimuli)}
+    conditions = {condition.name: ("conditions", k, "clip") for k, condition in enumerate(spec.conditions)}
+    made: dict[Cell, ClipSpec] = {}
+    faults: dict[tuple[str, int, str], str] = {}
+    for cell in spec.cells():
+        alone = {**spec.video.model_dump(), **spec.stimulus(cell.stimulus).clip}
+        # What fails without the condition is the stimulus's fault; what fails only with it, the condition's.
+        for path, fields in (
+            (stimuli[cell.stimulus], alone),
+            (conditions[cell.condition], spec.clip_fields(*cell)),
+        ):
+            try:
+                made[cell] = _clip_spec(fields)
+            except SynthError as error:
+                faults.setdefault(path, str(error))
+                break
+    if faults:
+        located = located_yaml.parse(text, source=source)
+        problems = [Problem(located.line(path), located_yaml.field_name(path), fault) for path, fault in faults.items()]
+        raise StudyFileError(source, sorted(problems, key=lambda problem: problem.line or 0))
+    return made
+
+
+def _clip_spec(fields: Mapping[str, Any]) -> ClipSpec:
+    clip = ClipSpec.from_dict(fields)
+    if clip.identity not in IDENTITIES:
+        raise SpecError(f"Clip: there is no identity {clip.identity!r}; there are: {', '.join(sorted(IDENTITIES))}.")
+    return clip
 
 
 def _clip(session: Session, spec: ClipSpec, digest: str) -> Clip:

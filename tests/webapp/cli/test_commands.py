@@ -97,6 +97,7 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
         (("face", "1.5", "0", "0", "--out", "x.png"), ("1.5",)),
         (("face", "0", "0", "0", "--out", "nowhere/x.png"), ("does not exist", "--out")),
         (("face", "0", "0", "0", "--out", "x.png", "--identity", "nobody"), ("nobody", "default")),
+        (("say", "Hi", "--out", "x.mp4", "--lineage", "nowhere/x.json"), ("does not exist", "--lineage")),
         (("study", "show", "nosuch"), ("nosuch",)),
         (("report", "nosuch"), ("nosuch",)),
         (("export", "nosuch"), ("nosuch",)),
@@ -117,6 +118,7 @@ def test_wrong_input_gives_one_sentence(
         ("face", "a", "0", "0", "--out", "x.png"),
         ("face", "0", "0", "0", "--out", "x.jpg"),
         ("say", "Hello", "--out", "x.mp4", "--size", "large"),
+        ("say", "Hello", "--out", "x.mp4", "--lineage", "x.mp4"),
         ("nosuch",),
         ("serve", "--port", "0"),
         ("export", "demo", "--format", "nosuch"),
@@ -155,8 +157,17 @@ def test_a_clip_that_synthesis_cannot_make_is_found_before_anything_is_stored(
     path = tmp_path / "far.yaml"
     path.write_text(source.replace("[-0.40, 0.22, 0.12]", "[-4.0, 0.22, 0.12]"), encoding="utf-8")
     for command in ("validate", "apply"):
-        _fails(run("study", command, str(path)), "-4")
+        _fails(run("study", command, str(path)), "far.yaml, line 16", "stimuli[1].clip", "-4")
     assert json.loads(run("study", "list", "--json").output) == []
+
+
+def test_a_fault_of_a_condition_is_found_at_the_condition(
+    run: object, tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
+    source = (pytestconfig.rootpath / "tests" / "data" / "mini.yaml").read_text(encoding="utf-8")
+    path = tmp_path / "who.yaml"
+    path.write_text(source.replace("{intensity: 0.4}", "{intensity: 0.4, identity: anna}"), encoding="utf-8")
+    _fails(run("study", "validate", str(path)), "who.yaml, line 12", "conditions[0].clip", "'anna'", "default")
 
 
 def test_the_life_of_a_study(run: object, tmp_path: Path, database: object, pytestconfig: pytest.Config) -> None:

@@ -102,10 +102,17 @@ def test_a_broken_playback_log_does_not_cost_the_answers(
     browser: Any, answers: dict[str, str], database: Database
 ) -> None:
     browser.enrol()
-    for position, log in enumerate(['{"no": "list"}', "[[1]]", '[["explode", 1, 2]]', "[["], start=1):
+    for position, log in enumerate(['{"no": "list"}', "[[1]]", '[["explode", 1, 2]]', "[" * 100_000], start=1):
         browser.send(f"/s/mini/trial/{position}", {**answers, "playback": log})
     assert _count(database, Response) == 8
     assert _count(database, PlaybackEvent) == 0
+
+
+@pytest.mark.every_database
+def test_a_damaged_cookie_is_nobody(app: Flask) -> None:
+    with app.test_client() as client:
+        answer = client.get("/s/mini/trial", headers={"Cookie": 'padlab_mini="\\000"'})
+    assert answer.status_code == 303
 
 
 def test_chinese_pages_are_chinese(browser: Any) -> None:
