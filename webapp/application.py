@@ -1,10 +1,9 @@
 """The Flask application: what its parts are and how errors become pages."""
 
 import hashlib
-from dataclasses import dataclass
 from functools import cache
 
-from flask import Flask, current_app, render_template, request, url_for
+from flask import Flask, render_template, request, url_for
 from flask_babel import Babel, get_locale
 from flask_bootstrap import Bootstrap5
 from flask_wtf.csrf import CSRFError, CSRFProtect
@@ -16,24 +15,10 @@ from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
 from webapp.media import MediaStore
+from webapp.parts import Parts
 from webapp.resources import resource_dir
 
 MAX_FORM_BYTES = 1024 * 1024
-
-
-@dataclass(frozen=True)
-class Parts:
-    """What views need: settings, database, media store."""
-
-    settings: Settings
-    database: Database
-    media: MediaStore
-
-
-def parts() -> Parts:
-    """Return the parts of the running application."""
-    found: Parts = current_app.extensions["padlab"]
-    return found
 
 
 def build(settings: Settings | None = None) -> Flask:

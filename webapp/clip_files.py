@@ -2,8 +2,10 @@
 
 from io import BytesIO
 
-from flask import Blueprint, abort, current_app, send_file
+from flask import Blueprint, abort, send_file
 from werkzeug.wrappers import Response
+
+from webapp.parts import parts
 
 blueprint = Blueprint("clip_files", __name__)
 YEAR_SECONDS = 365 * 24 * 3600
@@ -12,7 +14,7 @@ YEAR_SECONDS = 365 * 24 * 3600
 @blueprint.get("/clips/<digest>.mp4")
 def clip(digest: str) -> Response:
     """Send a clip; its address is the digest of its content, so it never changes."""
-    media = current_app.extensions["padlab"].media
+    media = parts().media
     try:
         path = media.local_path(digest)
         if path is not None and not path.is_file():

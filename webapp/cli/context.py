@@ -15,7 +15,7 @@ from webapp.db import Database
 NEGATIVE_NUMBERS = {"ignore_unknown_options": True}
 
 
-def open_database(settings: Settings | None = None) -> tuple[Settings, Database]:
+def open_database() -> tuple[Settings, Database]:
     """Return the settings and a database whose schema is the code's.
 
     Raises
@@ -23,7 +23,7 @@ def open_database(settings: Settings | None = None) -> tuple[Settings, Database]
     WebappError
         If a setting is wrong, or the database cannot be used.
     """
-    settings = settings or Settings.from_env()
+    settings = Settings.from_env()
     database = Database(settings.database_url)
     database.require_current()
     return settings, database

@@ -11,9 +11,9 @@ import click
 from gunicorn.app.base import BaseApplication
 
 from webapp import create_app
-from webapp.application import Parts
 from webapp.config import Settings
 from webapp.errors import ConfigError
+from webapp.parts import Parts
 
 THREADS = 4
 KEEPALIVE_SECONDS = 5
@@ -116,9 +116,9 @@ def check(settings: Settings) -> None:
     WebappError
         As `webapp.create_app`.
     """
-    parts: Parts = create_app(settings).extensions["padlab"]
+    made: Parts = create_app(settings).extensions["padlab"]
     # A connection must not be carried through gunicorn's fork: both sides would use it.
-    parts.database.dispose()
+    made.database.dispose()
 
 
 @click.command()

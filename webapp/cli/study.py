@@ -8,7 +8,6 @@ import click
 from evaluation import study as study_file
 from evaluation.study import StudySpec
 from webapp.cli.context import echo_json, open_database
-from webapp.config import Settings
 from webapp.errors import NotFoundError
 from webapp.models import StudyState
 from webapp.services import clips, studies
@@ -131,7 +130,7 @@ def close(slug: str) -> None:
 
 
 def _set_state(slug: str, state: StudyState) -> None:
-    _, database = open_database(Settings.from_env())
+    _, database = open_database()
     with database.write() as session:
         studies.set_state(session, slug, state)
     click.echo(f"The study '{slug}' is {state}.")

@@ -1,10 +1,10 @@
 """Logging in and out."""
 
-from flask import current_app
 from flask_babel import lazy_gettext
 from flask_login import LoginManager, UserMixin
 
 from webapp.models import Experimenter
+from webapp.parts import parts
 from webapp.services import experimenters
 
 login_manager = LoginManager()
@@ -24,7 +24,7 @@ class Account(UserMixin):  # type: ignore[misc]
 
 def load(account_id: str) -> Account | None:
     """Return the account that a session cookie names, None when it is gone."""
-    with current_app.extensions["padlab"].database.read() as db:
+    with parts().database.read() as db:
         experimenter = experimenters.get(db, int(account_id)) if account_id.isdigit() else None
         return Account(experimenter) if experimenter else None
 

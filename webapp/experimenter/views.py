@@ -4,25 +4,20 @@ import io
 import zipfile
 from typing import Any
 
-from flask import Blueprint, Response, current_app, flash, redirect, render_template, request, url_for
+from flask import Blueprint, Response, flash, redirect, render_template, request, url_for
 from flask_babel import gettext
 from flask_login import current_user, login_user, logout_user
 from werkzeug.wrappers import Response as BaseResponse
 
 from evaluation.report import figures, html, tables
 from webapp import locale, security
-from webapp.db import Database
 from webapp.errors import NotFoundError
 from webapp.experimenter.login import Account, login_manager
 from webapp.models import StudyState
+from webapp.parts import parts
 from webapp.services import clips, enrolment, experimenters, exports, results, studies
 
 blueprint = Blueprint("experimenter", __name__, url_prefix="/experimenter")
-
-
-def _database() -> Database:
-    database: Database = current_app.extensions["padlab"].database
-    return database
 
 
 def _page(template: str, **values: Any) -> str:
@@ -46,7 +41,7 @@ def login() -> BaseResponse | str | tuple[str, int]:
         return redirect(target)
     if request.method == "GET":
         return _page("login.html", next=target)
-    with _database().read() as db:
+    with parts().database.read() as db:
         found = experimenters.authenticate(db, request.form.get("name", ""), request.form.get("password", ""))
     if found is None:
         return _page("login.html", next=target, name=request.form.get("name", ""), failed=True), 401
@@ -64,20 +59,19 @@ def logout() -> BaseResponse:
 @blueprint.get("/")
 def index() -> str:
     """List the studies."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         return _page("index.html", studies=studies.overviews(db))
 
 
 @blueprint.get("/<slug>/")
 def study(slug: str) -> str:
     """Show what a study has collected and what it says so far."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         found = studies.find(db, slug)
         report = results.report(db, slug)
         return _page(
             "study.html",
             study=found,
-            spec=studies.spec_of(found),
             progress=clips.progress(db, found),
             failures=clips.failures(db, found),
             participants=enrolment.participants(db, slug),
@@ -93,7 +87,7 @@ def set_state(slug: str) -> BaseResponse:
     """Open or close the study."""
     state = StudyState(request.form["state"]) if request.form.get("state") in set(StudyState) else None
     if state is not None:
-        with _database().write() as db:
+        with parts().database.write() as db:
             studies.set_state(db, slug, state)
         flash(gettext("The study is open.") if state == StudyState.OPEN else gettext("The study is closed."), "success")
     return redirect(url_for("experimenter.study", slug=slug), code=303)
@@ -102,7 +96,7 @@ def set_state(slug: str) -> BaseResponse:
 @blueprint.get("/<slug>/clips.json")
 def clip_progress(slug: str) -> dict[str, int]:
     """Tell how far rendering is, for the progress bar."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         return clips.progress(db, studies.find(db, slug)).to_dict()
 
 
@@ -111,7 +105,7 @@ def figure(slug: str, name: str) -> Response:
     """Draw a figure of the report."""
     if name not in figures.NAMES:
         raise NotFoundError(name)
-    with _database().read() as db:
+    with parts().database.read() as db:
         svg = figures.draw(name, results.report(db, slug))
     response = Response(svg, mimetype="image/svg+xml")
     # Drawings carry their styles inside.
@@ -122,7 +116,7 @@ def figure(slug: str, name: str) -> Response:
 @blueprint.get("/<slug>/report.html")
 def report(slug: str) -> Response:
     """Send the whole report as one file."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         response = Response(html.render(results.report(db, slug)), mimetype="text/html")
     response.headers["Content-Security-Policy"] = security.REPORT_POLICY
     return response
@@ -131,7 +125,7 @@ def report(slug: str) -> Response:
 @blueprint.get("/<slug>/export.zip")
 def export_all(slug: str) -> Response:
     """Send all tables as CSV in one archive."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         frames = exports.frames(db, slug)
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as out:

@@ -1,11 +1,12 @@
 """Who is at the other end: a long-lived cookie names the participant, a session cookie the sitting."""
 
-from flask import Flask, current_app, request, session
+from flask import request, session
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response
 
 from webapp.errors import NotFoundError
 from webapp.models import Participant
+from webapp.parts import parts
 from webapp.services import enrolment
 
 COOKIE_SECONDS = 180 * 24 * 3600
@@ -57,7 +58,6 @@ def visit_id(participant: Participant) -> int:
     """Return this sitting's number, beginning one when the browser was opened anew."""
     key = f"visit_{participant.id}"
     if key not in session:
-        app: Flask = current_app
-        with app.extensions["padlab"].database.write() as db:
+        with parts().database.write() as db:
             session[key] = enrolment.begin_visit(db, participant, user_agent=request.user_agent.string).id
     return int(session[key])

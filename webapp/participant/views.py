@@ -3,26 +3,21 @@
 import json
 from typing import Any
 
-from flask import Blueprint, current_app, redirect, render_template, request, url_for
+from flask import Blueprint, redirect, render_template, request, url_for
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response
 
 from evaluation import instruments
 from evaluation.study import StudySpec
 from webapp import locale
-from webapp.db import Database
 from webapp.models import ClipStatus, Participant, Study, StudyState, Trial
 from webapp.participant import identity
+from webapp.parts import parts
 from webapp.services import clips, enrolment, studies, trials
 from webapp.services.trials import AnswersRefusedError, Playback
 
 blueprint = Blueprint("participant", __name__)
 MAX_PLAYBACK_LENGTH = 20_000
-
-
-def _database() -> Database:
-    database: Database = current_app.extensions["padlab"].database
-    return database
 
 
 def _go(endpoint: str, slug: str, **values: Any) -> Response:
@@ -52,7 +47,7 @@ def _study_page(template: str, spec: StudySpec, study: Study, **values: Any) -> 
 @blueprint.get("/")
 def home() -> str:
     """List the studies that are open."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         found = [(spec.slug, spec.title[_language(spec)]) for spec in studies.open_specs(db)]
     return render_template("participant/home.html", studies=found, languages=list(locale.LOCALES))
 
@@ -60,7 +55,7 @@ def home() -> str:
 @blueprint.get("/s/<slug>/")
 def welcome(slug: str) -> Response | str:
     """Say what the study is and ask for consent; who is enrolled goes on where they stopped."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is not None:
@@ -72,14 +67,14 @@ def welcome(slug: str) -> Response | str:
 @blueprint.post("/s/<slug>/consent")
 def consent(slug: str) -> Response | str:
     """Enrol the person who agreed."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         study = studies.find(db, slug)
         spec = studies.spec_of(study)
         if identity.find(db, slug) is not None:
             return _go("instructions", slug)
         if request.form.get("consent") != "yes":
             return _study_page("welcome.html", spec, study, open=study.state == StudyState.OPEN, problem="consent")
-    with _database().write() as db:
+    with parts().database.write() as db:
         participant = enrolment.enrol(db, slug, language=_language(spec), token=identity.expect(slug))
     return identity.remember(_go("instructions", slug), slug, participant.token)
 
@@ -94,7 +89,7 @@ def again(slug: str, position: int = 0) -> Response:
 @blueprint.post("/s/<slug>/leave")
 def leave(slug: str) -> Response:
     """Forget who sits at this browser, so that somebody else can begin; answers stay."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         studies.find(db, slug)
     return identity.forget(_go("welcome", slug), slug)
 
@@ -102,7 +97,7 @@ def leave(slug: str) -> Response:
 @blueprint.get("/s/<slug>/resume/<token>")
 def resume(slug: str, token: str) -> Response:
     """Go on with a personal link, in this or another browser."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         participant = enrolment.find(db, slug, token)
         response = _go("trial" if participant.completed_at is None else "debrief", slug)
         return identity.remember(response, slug, participant.token)
@@ -111,7 +106,7 @@ def resume(slug: str, token: str) -> Response:
 @blueprint.get("/s/<slug>/instructions")
 def instructions(slug: str) -> Response | str:
     """Explain the task."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is None:
@@ -130,7 +125,7 @@ def instructions(slug: str) -> Response | str:
 @blueprint.get("/s/<slug>/trial")
 def trial(slug: str) -> Response | str:
     """Show the first trial without an answer."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         participant = identity.find(db, slug)
         if participant is None:
             return _go("welcome", slug)
@@ -140,7 +135,7 @@ def trial(slug: str) -> Response | str:
             return _go("debrief", slug)
         page = _trial_page(db, participant, current)
     if current.shown_at is None and current.stimulus.clip.status == ClipStatus.DONE:
-        with _database().write() as db:
+        with parts().database.write() as db:
             trials.mark_shown(db, current.id)
     return page
 
@@ -178,7 +173,7 @@ def _trial_page(
 @blueprint.post("/s/<slug>/trial/<int(max=100000):position>")
 def answer(slug: str, position: int) -> Response | tuple[str, int]:
     """Store a trial's answers; the next trial is shown only when they are on disk."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         participant = identity.find(db, slug)
         if participant is None:
             return _go("welcome", slug)
@@ -188,7 +183,7 @@ def answer(slug: str, position: int) -> Response | tuple[str, int]:
         answers = trials.validate(spec, request.form)
     except AnswersRefusedError as refused:
         return _answer_again(slug, position, refused.problems)
-    with _database().write() as db:
+    with parts().database.write() as db:
         following = trials.record(
             db,
             participant,
@@ -201,7 +196,7 @@ def answer(slug: str, position: int) -> Response | tuple[str, int]:
 
 
 def _answer_again(slug: str, position: int, problems: dict[str, str]) -> Response | tuple[str, int]:
-    with _database().read() as db:
+    with parts().database.read() as db:
         participant = identity.find(db, slug)
         current = trials.current(db, participant) if participant else None
         if participant is None or current is None or current.position != position:
@@ -226,7 +221,7 @@ def _playback(text: str) -> list[Playback]:
 @blueprint.get("/s/<slug>/debrief")
 def debrief(slug: str) -> Response | str:
     """Thank, and say what it was about."""
-    with _database().read() as db:
+    with parts().database.read() as db:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is None:
