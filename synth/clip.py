@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import lru_cache
 from importlib.metadata import version
@@ -20,8 +20,9 @@ from synth.expression.course import Course, blink_track, expression_track
 from synth.expression.pad_pep import MODEL_NAMES, load_model
 from synth.expression.pep_fap import pep_to_fap, translation_digest
 from synth.face.assets import asset_digest
-from synth.face.deformation import Motion, solve
-from synth.face.mesh import FaceModel, load_face
+from synth.face.deformation import solve
+from synth.face.mesh import load_face
+from synth.face.rig import Rig
 from synth.pad import PAD
 from synth.render import RENDERER_VERSION, Renderer
 from synth.video import VideoWriter, write_png
@@ -182,13 +183,13 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
     AssetError, RenderError, VideoError
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
-    face, renderer = _stage(face_dir, asset_digest(face_dir), spec.identity, spec.width, spec.height)
+    rig, renderer = _stage(face_dir, asset_digest(face_dir), spec.identity, spec.width, spec.height)
     pep, apex = _apex(spec.pad, spec.model, spec.intensity)
-    motion = solve(np.sum(_tracks(apex, spec.course, spec.seed), axis=0), face)
+    motion = solve(np.sum(_tracks(apex, spec.course, spec.seed), axis=0), rig)
     with VideoWriter(out, spec.width, spec.height, fps=spec.fps) as video:
-        for picture in _pictures(renderer, motion):
+        for picture in renderer.frames(motion):
             video.write(picture)
-    frames = len(motion.weights)
+    frames = len(motion)
     return {
         "digest": clip_digest(spec, face_dir),
         "spec": spec.to_dict(),
@@ -238,32 +239,22 @@ def render_still(
     """
     point = PAD.parse(pad).as_tuple()
     _check_choice("model", model, MODEL_NAMES)
-    face, renderer = _stage(face_dir, asset_digest(face_dir), identity, width, height)
+    rig, renderer = _stage(face_dir, asset_digest(face_dir), identity, width, height)
     pep, apex = _apex(point, model, _real("intensity", intensity, *_REAL_RANGES["intensity"]))
-    motion = solve(apex[None, :], face)
-    write_png(out, next(_pictures(renderer, motion)))
+    motion = solve(apex[None, :], rig)
+    write_png(out, renderer.frame(motion))
     asked = {"model": model, "identity": identity, "width": width, "height": height, "intensity": float(intensity)}
     return {**asked, **_lineage(point, pep, apex, _digests(model, face_dir))}
 
 
 @lru_cache(maxsize=2)
-def _stage(face_dir: Path, _assets: str, identity: str, width: int, height: int) -> tuple[FaceModel, Renderer]:
-    """Return a face and its renderer; a process that makes many clips dresses the face once.
+def _stage(face_dir: Path, _assets: str, identity: str, width: int, height: int) -> tuple[Rig, Renderer]:
+    """Return a figure and its renderer; a process that makes many clips dresses the face once.
 
     The digest of the face data is a key of the cache, so that new data are noticed.
     """
-    face = load_face(face_dir, identity)
-    return face, Renderer(face, width=width, height=height)
-
-
-def _pictures(renderer: Renderer, motion: Motion) -> Iterator[NDArray[np.uint8]]:
-    """Draw each frame; a pose that does not change is drawn once."""
-    drawn: tuple[Floats, NDArray[np.uint8]] | None = None
-    for weights, head, eyes in zip(motion.weights, motion.head, motion.eyes, strict=True):
-        pose = np.concatenate([weights, head, eyes.ravel()])
-        if drawn is None or not np.array_equal(drawn[0], pose):
-            drawn = pose, renderer.frame(weights, head=head, eyes=eyes)
-        yield drawn[1]
+    rig = Rig(load_face(face_dir, identity))
+    return rig, Renderer(rig, width=width, height=height)
 
 
 def _apex(pad: tuple[float, float, float], model: str, intensity: float) -> tuple[Floats, Floats]:

@@ -14,10 +14,11 @@ from types import ModuleType, TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from synth.errors import RenderError, SpecError
 from synth.face.mesh import FaceModel
+from synth.face.motion import Motion
 from synth.face.rig import Rig
 
 RENDERER_VERSION = "1"
@@ -43,8 +44,8 @@ class Renderer:
 
     Parameters
     ----------
-    face : FaceModel
-        The face, see `synth.face.mesh.load_face`.
+    rig : Rig
+        The figure.
     width, height : int
         Size of the frames in pixels, each from 16 to 4096.
 
@@ -56,37 +57,25 @@ class Renderer:
         If the size is out of range.
     """
 
-    def __init__(self, face: FaceModel, *, width: int = 720, height: int = 576) -> None:
+    def __init__(self, rig: Rig, *, width: int = 720, height: int = 576) -> None:
         for name, size in (("width", width), ("height", height)):
             if not MIN_SIZE <= size <= MAX_SIZE:
                 raise SpecError(f"The frame's {name} is {size}; it must be from {MIN_SIZE} to {MAX_SIZE} pixels.")
         self.width, self.height = width, height
-        self._rig = Rig(face)
+        self._rig = rig
         with _current() as gl:
             self._drawing = gl.drawing(width, height)
             # Also at the interpreter's end, while OpenGL still works.
             self._free = weakref.finalize(self, _delete, self._drawing)
             self._mesh = gl.mesh(self._rig)
-            self._scene = gl.scene(self._mesh, *_camera(face, width, height))
-            positions, normals = self._rig.pose(np.zeros(len(face.morph_names)), (0, 0, 0), ((0, 0), (0, 0)))
+            self._scene = gl.scene(self._mesh, *_camera(rig.face, width, height))
+            positions, normals = rig.pose(Motion.of())
             self._vertices = gl.vertices(self._rig, positions, normals)
             # The first drawing creates the buffers that later frames write to.
             gl.draw(self._drawing, self._scene)
 
-    def frame(
-        self, weights: ArrayLike, *, head: ArrayLike = (0, 0, 0), eyes: ArrayLike = ((0, 0), (0, 0))
-    ) -> NDArray[np.uint8]:
-        """Draw the face in one pose.
-
-        Parameters
-        ----------
-        weights : (52,) array of float
-            Weights of the morphs in the face's order, usually 0 to 1.
-        head : (3,) array of float
-            Rotation of the head in radians: pitch (down positive), yaw (to the subject's left positive),
-            roll (towards the subject's right shoulder positive).
-        eyes : (2, 2) array of float
-            Rotation of the left and the right eye in radians: yaw (subject's left positive), pitch (down positive).
+    def frame(self, motion: Motion, frame: int = 0) -> NDArray[np.uint8]:
+        """Draw one frame of a motion.
 
         Returns
         -------
@@ -95,22 +84,26 @@ class Renderer:
 
         Raises
         ------
-        SpecError
-            If an argument has the wrong shape or holds values that are not finite.
         RenderError
             If the renderer is closed, or OpenGL fails.
         """
         if self._mesh is None:
             raise RenderError("The renderer is closed; make a new one.")
-        given = {"weights": ((52,), weights), "head": ((3,), head), "eyes": ((2, 2), eyes)}
-        checked = [_finite(name, value, shape) for name, (shape, value) in given.items()]
-        positions, normals = self._rig.pose(*checked)
+        positions, normals = self._rig.pose(motion, frame)
         with _current() as gl:
             # Inside the lock: clips of several threads may share this renderer.
             self._vertices[:, 0:3] = positions
             self._vertices[:, 3:6] = normals
             gl.upload(self._mesh, self._vertices)
             return gl.draw(self._drawing, self._scene)
+
+    def frames(self, motion: Motion) -> Iterator[NDArray[np.uint8]]:
+        """Draw all frames of a motion, one after the other; a pose that does not change is drawn once."""
+        picture: NDArray[np.uint8] | None = None
+        for frame, changed in enumerate(motion.changes()):
+            if picture is None or changed:
+                picture = self.frame(motion, frame)
+            yield picture
 
     def close(self) -> None:
         """Free what the graphics context holds for this renderer; a second call does nothing."""
@@ -129,15 +122,6 @@ class Renderer:
 def _delete(drawing: Any) -> None:
     with _current():
         drawing.delete()
-
-
-def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    array = np.asarray(value, dtype=np.float64)
-    if array.shape != shape:
-        raise SpecError(f"{name} has the shape {array.shape}; it must be {shape}.")
-    if not np.isfinite(array).all():
-        raise SpecError(f"{name} holds a value that is not a finite number.")
-    return array
 
 
 def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:

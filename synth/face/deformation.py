@@ -4,13 +4,13 @@ A FAP says how far a feature point goes along one axis. The morphs whose weights
 where their FAPs want them are found by bounded least squares; points whose FAP is 0 are asked to stay.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.feature_points import VERTICES, skin_rows
 from synth.face.mesh import FaceModel
+from synth.face.motion import Motion
+from synth.face.rig import Rig
 from synth.fap.table import Fap, check_sequence, column, faps
 from synth.fap.units import ANGLE_UNIT, FaceUnits
 
@@ -69,26 +69,7 @@ _STEPS = 600
 _RELAXATION = 1.6
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """What the renderer needs for each of T frames.
-
-    Attributes
-    ----------
-    weights : (T, 52) float64
-        Morph weights in the face's order, 0 to `MAX_WEIGHT`.
-    head : (T, 3) float64
-        Pitch (down positive), yaw (to the subject's left positive) and roll (to the subject's right positive), rad.
-    eyes : (T, 2, 2) float64
-        Left and right eye: yaw (to the subject's left positive) and pitch (down positive), rad.
-    """
-
-    weights: Floats
-    head: Floats
-    eyes: Floats
-
-
-def solve(values: NDArray[np.floating] | Floats, face: FaceModel) -> Motion:
+def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     """Find the motion that FAP values ask of a face.
 
     Parameters
@@ -96,8 +77,8 @@ def solve(values: NDArray[np.floating] | Floats, face: FaceModel) -> Motion:
     values : (T, 68)
         FAP values in FAPU, see `synth.fap.table`. The ears, the tongue, the depth of the eyeballs, the size of the
         pupils and the two high-level parameters have no morphs and are left out.
-    face : FaceModel
-        The face, whose own feature points and units count.
+    rig : Rig
+        The figure, whose own feature points and units count.
 
     Returns
     -------
@@ -111,6 +92,7 @@ def solve(values: NDArray[np.floating] | Floats, face: FaceModel) -> Motion:
         If ``values`` is not a finite (T, 68) array.
     """
     sequence = check_sequence(values)
+    face = rig.face
     system = _System(face)
     weights = np.zeros((len(sequence), len(face.morph_names)))
     # Clips hold still for long: each different frame is solved once.
@@ -121,7 +103,14 @@ def solve(values: NDArray[np.floating] | Floats, face: FaceModel) -> Motion:
     right = sequence[:, [column(24), column(26)]]
     eyes = np.stack([left, right], axis=1) * ANGLE_UNIT
     _follow_gaze(weights, eyes, face.morph_names)
-    return Motion(weights=weights, head=head, eyes=eyes)
+    return Motion(
+        weights=weights,
+        head=head,
+        eyes=eyes,
+        thrust=np.zeros((len(sequence), 2)),
+        pupils=np.ones((len(sequence), 2)),
+        residual=np.zeros((len(sequence), 0, 3)),
+    )
 
 
 def moving_faps() -> tuple[Fap, ...]:

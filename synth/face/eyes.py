@@ -13,6 +13,8 @@ IRIS = np.radians(27.0)
 PUPIL = np.radians(10.5)
 """Half-angles that iris and pupil take on the ball."""
 
+EYES = ("left-eye", "right-eye")
+
 _MERIDIANS = 40
 _SCLERA = np.array([0.86, 0.835, 0.815])
 _VEIN = np.array([0.80, 0.60, 0.56])
@@ -45,8 +47,10 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
     quads = grid_quads(len(rings), _MERIDIANS)
     still = np.zeros((len(face.morph_names), len(points), 3), dtype=np.float32)
     balls = []
-    for centre in face.eye_centres:
-        ball_surface = loose_surface(points + centre, quads, still, colour, gloss=(0, 1), shade=np.maximum(shade, 0.3))
+    for name, centre in zip(EYES, face.eye_centres, strict=True):
+        ball_surface = loose_surface(
+            name, points + centre, quads, still, colour, gloss=(0, 1), shade=np.maximum(shade, 0.3)
+        )
         balls.append(Surface(**{**vars(ball_surface), "gloss": gloss}))
     return balls
 
@@ -78,11 +82,13 @@ def lashes(face: FaceModel) -> list[Surface]:
     for side in range(2):
         for row, length in ((2, 0.45),):
             part = face.parts[f"{'lr'[side]}-eyelashes-{row}"]
-            strips.append(_strip(part, face.eye_centres[side], face.eye_radius, length))
+            strips.append(
+                _strip(f"{('left', 'right')[side]}-lashes", part, face.eye_centres[side], face.eye_radius, length)
+            )
     return strips
 
 
-def _strip(part: Part, centre: Floats, radius: float, length: float) -> Surface:
+def _strip(name: str, part: Part, centre: Floats, radius: float, length: float) -> Surface:
     arm = part.vertices - centre
     distance = np.linalg.norm(arm, axis=1)
     roots = np.flatnonzero(distance < radius * 1.16)
@@ -91,4 +97,4 @@ def _strip(part: Part, centre: Floats, radius: float, length: float) -> Surface:
     # In front of the lid's own margin.
     vertices = vertices + _LASH_CLEARANCE * (vertices - centre) / np.linalg.norm(vertices - centre, axis=1)[:, None]
     morphs = part.morphs[:, nearest] + length * (part.morphs - part.morphs[:, nearest])
-    return loose_surface(vertices, part.quads, morphs, _LASH, gloss=(0.0, 1.0))
+    return loose_surface(name, vertices, part.quads, morphs, _LASH, gloss=(0.0, 1.0))

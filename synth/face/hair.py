@@ -24,7 +24,7 @@ def bob(face: FaceModel, skin: Surface) -> list[Surface]:
     """Return the outer and the dark inner side of a bob over a skin whose scalp is already thickened."""
     outside = _sheet(face, skin)
     matt = np.broadcast_to((0.0, 1.0), outside.gloss.shape)
-    inside = replace(outside, quads=outside.quads[:, ::-1], shade=0.3 * outside.shade, gloss=matt)
+    inside = replace(outside, name="hair-inside", quads=outside.quads[:, ::-1], shade=0.3 * outside.shade, gloss=matt)
     return [outside, inside]
 
 
@@ -61,6 +61,7 @@ def _sheet(face: FaceModel, skin: Surface) -> Surface:
     shade = 0.62 + 0.38 * np.clip(from_edge / 0.30, 0, 1)
     shade = shade * (1.0 - 0.35 * fall[:, None] ** 2)
     return Surface(
+        name="hair",
         vertices=vertices,
         quads=grid_quads(len(elevation), _COLUMNS, closed=False),
         morphs=np.zeros((len(face.morph_names), n, 3), dtype=np.float32),

@@ -37,6 +37,7 @@ _FIRST_GUM_LEVEL = 9
 class _Row:
     """One row of teeth: lengths in dm relative to the middle of its helper's front."""
 
+    name: str
     part: Part
     up: float
     half_width: float
@@ -51,8 +52,26 @@ def teeth(face: FaceModel) -> list[Surface]:
     upper, lower = face.parts["upper-teeth"], face.parts["lower-teeth"]
     bite = float(upper.vertices[:, 1].min())
     rows = (
-        _Row(part=upper, up=1.0, half_width=0.305, inset=0.012, scale=1.0, edge=bite - 0.042, length=0.105),
-        _Row(part=lower, up=-1.0, half_width=0.285, inset=0.022, scale=0.86, edge=bite - 0.020, length=0.085),
+        _Row(
+            name="upper-teeth",
+            part=upper,
+            up=1.0,
+            half_width=0.305,
+            inset=0.012,
+            scale=1.0,
+            edge=bite - 0.042,
+            length=0.105,
+        ),
+        _Row(
+            name="lower-teeth",
+            part=lower,
+            up=-1.0,
+            half_width=0.285,
+            inset=0.022,
+            scale=0.86,
+            edge=bite - 0.020,
+            length=0.085,
+        ),
     )
     return [_teeth(row) for row in rows]
 
@@ -85,6 +104,7 @@ def _teeth(row: _Row) -> Surface:
     dim = 1.0 - 0.72 * np.clip((np.abs(along) - 0.12) / 0.16, 0, 1)
     depth = np.interp(level[:, 0], [0, 2, 8, 12], [0.5, 0.95, 0.85, 0.55])
     return loose_surface(
+        row.name,
         vertices,
         quads[:, ::-1] if row.up > 0 else quads,
         _carried(row.part, vertices),
@@ -125,4 +145,4 @@ def tongue(face: FaceModel) -> Surface:
     vertices = matrix @ part.vertices - _TONGUE_REST
     morphs = np.stack([matrix @ morph for morph in part.morphs])
     back = np.clip((vertices[:, 2] - vertices[:, 2].min()) / np.ptp(vertices[:, 2]), 0, 1)
-    return loose_surface(vertices, quads, morphs, _TONGUE, gloss=(0.16, 18.0), shade=0.25 + 0.55 * back)
+    return loose_surface("tongue", vertices, quads, morphs, _TONGUE, gloss=(0.16, 18.0), shade=0.25 + 0.55 * back)

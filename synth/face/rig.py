@@ -1,12 +1,14 @@
 """The rig: from morph weights, head pose and gaze to the vertices of the whole figure."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
 from synth.face.appearance import dress
+from synth.face.eyes import EYES
 from synth.face.mesh import FaceModel
+from synth.face.motion import Motion
 
 Floats = NDArray[np.float64]
 
@@ -17,8 +19,17 @@ NECK_SHARE = 0.4
 class Rig:
     """The figure that is drawn: all surfaces in one set of vertices.
 
+    Parameters
+    ----------
+    face : FaceModel
+        The face, see `synth.face.mesh.load_face`.
+
     Attributes
     ----------
+    face : FaceModel
+        The same.
+    spans : dict of str to slice
+        Rows of each surface, by its name.
     rest : (N, 3) float32
         Neutral positions in dm.
     triangles : (T, 3) uint32
@@ -34,9 +45,13 @@ class Rig:
     """
 
     def __init__(self, face: FaceModel) -> None:
+        self.face = face
         surfaces, self.texture = dress(face)
-        sizes = [len(surface.vertices) for surface in surfaces]
-        starts = np.cumsum([0, *sizes])
+        starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
+        self.spans = {
+            surface.name: slice(int(start), int(end))
+            for surface, start, end in zip(surfaces, starts[:-1], starts[1:], strict=True)
+        }
         rest = np.concatenate([surface.vertices for surface in surfaces])
         quads = np.concatenate([surface.quads + start for surface, start in zip(surfaces, starts[:-1], strict=True)])
         morphs = np.concatenate([surface.morphs for surface in surfaces], axis=1, dtype=np.float32)
@@ -58,19 +73,15 @@ class Rig:
         )
         follow = np.concatenate([surface.follow for surface in surfaces])
         self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
-        # The last two surfaces are the left and the right eyeball.
-        self._eyes = [slice(starts[-3], starts[-2]), slice(starts[-2], starts[-1])]
-        self._eye_centres = face.eye_centres
 
-    def pose(self, weights: ArrayLike, head: ArrayLike, eyes: ArrayLike) -> tuple[Floats, Floats]:
-        """Return positions (N, 3) in dm and unit normals (N, 3); the arguments are those of `Renderer.frame`."""
-        positions = self._rest + (self._morphs @ np.asarray(weights, dtype=np.float64)).reshape(-1, 3)
-        for span, centre, (yaw, pitch) in zip(
-            self._eyes, self._eye_centres, np.asarray(eyes, dtype=np.float64), strict=True
-        ):
-            turn = Rotation.from_euler("YX", [yaw, pitch]).as_matrix()
+    def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
+        """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion."""
+        positions = self._rest + (self._morphs @ motion.weights[frame]).reshape(-1, 3)
+        for eye, name in enumerate(EYES):
+            span, centre = self.spans[name], self.face.eye_centres[eye]
+            turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
             positions[span] = (self._rest[span] - centre) @ turn.T + centre
-        positions = self._turns.apply(positions, np.asarray(head, dtype=np.float64))
+        positions = self._turns.apply(positions, motion.head[frame])
         return positions, self._normals(positions)
 
     def _normals(self, positions: Floats) -> Floats:

@@ -52,6 +52,7 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         cover = np.maximum(cover, strength * _step(mask, 0.1, 0.9))
     gloss = np.stack([0.075 + 0.15 * lips - 0.075 * shirt + 0.10 * hair, 12.0 + 16.0 * lips + 10 * hair], axis=1)
     return Surface(
+        name="skin",
         vertices=vertices,
         quads=quads,
         morphs=morphs,

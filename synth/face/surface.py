@@ -14,6 +14,9 @@ class Surface:
 
     Attributes
     ----------
+    name : str
+        What it is, for instance "skin", "hair", "upper-teeth", "tongue", "left-eye". In "skin" and "tongue" the first
+        rows are the control mesh's vertices in their order, so that feature points are found on them.
     vertices : (N, 3) float64
         Positions in dm.
     quads : (Q, 4) int64
@@ -36,6 +39,7 @@ class Surface:
         Which quads are drawn; the others are always hidden and only shape the normals.
     """
 
+    name: str
     vertices: Floats
     quads: NDArray[np.int64]
     morphs: NDArray[np.float32] | Floats
@@ -49,6 +53,7 @@ class Surface:
 
 
 def loose_surface(
+    name: str,
     vertices: Floats,
     quads: NDArray[np.int64],
     morphs: NDArray[np.float32] | Floats,
@@ -60,6 +65,7 @@ def loose_surface(
     """Return a piece inside the head that carries its own colours and follows the head fully."""
     n = len(vertices)
     return Surface(
+        name=name,
         vertices=vertices,
         quads=quads,
         morphs=morphs,

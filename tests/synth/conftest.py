@@ -6,6 +6,7 @@ import pytest
 
 from synth.face.assets import fetch, is_compiled
 from synth.face.mesh import FaceModel, load_face
+from synth.face.rig import Rig
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,6 +27,11 @@ def face_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def face(face_dir: Path) -> FaceModel:
     return load_face(face_dir)
+
+
+@pytest.fixture(scope="session")
+def rig(face: FaceModel) -> Rig:
+    return Rig(face)
 
 
 @pytest.fixture

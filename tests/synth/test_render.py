@@ -8,15 +8,16 @@ import pytest
 
 from synth import render
 from synth.errors import RenderError, SpecError
-from synth.face.mesh import FaceModel
+from synth.face.motion import Motion
+from synth.face.rig import Rig
 from synth.render import Renderer
 
 Weights = Callable[..., np.ndarray]
 
 
 @pytest.fixture(scope="module")
-def renderer(face: FaceModel) -> Iterator[Renderer]:
-    with Renderer(face, width=320, height=256) as opened:
+def renderer(rig: Rig) -> Iterator[Renderer]:
+    with Renderer(rig, width=320, height=256) as opened:
         yield opened
 
 
@@ -38,16 +39,16 @@ def centre_of_face(frame: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [(320, 256), (144, 180), (181, 97)])
-def test_frames_have_the_size_asked_for(face: FaceModel, weights: Weights, size: tuple[int, int]) -> None:
-    with Renderer(face, width=size[0], height=size[1]) as renderer:
-        frame = renderer.frame(weights())
+def test_frames_have_the_size_asked_for(rig: Rig, weights: Weights, size: tuple[int, int]) -> None:
+    with Renderer(rig, width=size[0], height=size[1]) as renderer:
+        frame = renderer.frame(Motion.of(weights()))
     assert frame.shape == (size[1], size[0], 3)
     assert frame.dtype == np.uint8
     assert frame.std() > 20
 
 
 def test_head_is_framed_with_room_around_it(renderer: Renderer, weights: Weights) -> None:
-    frame = renderer.frame(weights())
+    frame = renderer.frame(Motion.of(weights()))
     background = np.round(np.array(render.BACKGROUND) * 255)
     figure = (np.abs(frame - background) > 3).any(axis=2)
     assert not figure[: len(figure) // 20].any()
@@ -56,48 +57,48 @@ def test_head_is_framed_with_room_around_it(renderer: Renderer, weights: Weights
 
 
 @pytest.mark.parametrize("size", [(144, 256), (128, 256), (256, 144)])
-def test_the_bust_reaches_the_lower_edge(face: FaceModel, weights: Weights, size: tuple[int, int]) -> None:
-    with Renderer(face, width=size[0], height=size[1]) as renderer:
-        lowest = renderer.frame(weights())[-1, size[0] // 4 : 3 * size[0] // 4].astype(int)
+def test_the_bust_reaches_the_lower_edge(rig: Rig, weights: Weights, size: tuple[int, int]) -> None:
+    with Renderer(rig, width=size[0], height=size[1]) as renderer:
+        lowest = renderer.frame(Motion.of(weights()))[-1, size[0] // 4 : 3 * size[0] // 4].astype(int)
     red, _, blue = lowest.T
     assert (blue > red).all(), "clothes from side to side"
     assert (lowest.max(axis=1) < 180).all(), "no background"
 
 
-def test_equal_input_gives_equal_frames(renderer: Renderer, face: FaceModel, weights: Weights) -> None:
+def test_equal_input_gives_equal_frames(renderer: Renderer, rig: Rig, weights: Weights) -> None:
     pose = {"head": (0.1, 0.2, -0.1), "eyes": ((0.1, 0.0), (0.1, 0.1))}
-    first = renderer.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose)
-    renderer.frame(weights(browDown=1))
-    assert (renderer.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose) == first).all()
-    with Renderer(face, width=320, height=256) as other:
-        assert (other.frame(weights(jawOpen=0.5, mouthSmile=0.3), **pose) == first).all()
+    first = renderer.frame(Motion.of(weights(jawOpen=0.5, mouthSmile=0.3), **pose))
+    renderer.frame(Motion.of(weights(browDown=1)))
+    assert (renderer.frame(Motion.of(weights(jawOpen=0.5, mouthSmile=0.3), **pose)) == first).all()
+    with Renderer(rig, width=320, height=256) as other:
+        assert (other.frame(Motion.of(weights(jawOpen=0.5, mouthSmile=0.3), **pose)) == first).all()
 
 
 def test_frames_are_the_callers_own(renderer: Renderer, weights: Weights) -> None:
-    first = renderer.frame(weights())
+    first = renderer.frame(Motion.of(weights()))
     kept = first.copy()
-    renderer.frame(weights(jawOpen=1))
+    renderer.frame(Motion.of(weights(jawOpen=1)))
     assert (first == kept).all()
 
 
-def test_two_renderers_do_not_disturb_each_other(renderer: Renderer, face: FaceModel, weights: Weights) -> None:
-    before = renderer.frame(weights())
-    other = Renderer(face, width=64, height=64)
-    other.frame(weights(jawOpen=1))
-    assert (renderer.frame(weights()) == before).all()
+def test_two_renderers_do_not_disturb_each_other(renderer: Renderer, rig: Rig, weights: Weights) -> None:
+    before = renderer.frame(Motion.of(weights()))
+    other = Renderer(rig, width=64, height=64)
+    other.frame(Motion.of(weights(jawOpen=1)))
+    assert (renderer.frame(Motion.of(weights())) == before).all()
     other.close()
     other.close()
-    assert (renderer.frame(weights()) == before).all()
+    assert (renderer.frame(Motion.of(weights())) == before).all()
 
 
 def test_another_thread_may_render(renderer: Renderer, weights: Weights) -> None:
-    expected = renderer.frame(weights())
+    expected = renderer.frame(Motion.of(weights()))
     found: list[np.ndarray] = []
-    thread = threading.Thread(target=lambda: found.append(renderer.frame(weights())))
+    thread = threading.Thread(target=lambda: found.append(renderer.frame(Motion.of(weights()))))
     thread.start()
     thread.join()
     assert (found[0] == expected).all()
-    assert (renderer.frame(weights()) == expected).all()
+    assert (renderer.frame(Motion.of(weights())) == expected).all()
 
 
 def test_blink_covers_the_eyes(renderer: Renderer, weights: Weights) -> None:
@@ -108,12 +109,12 @@ def test_blink_covers_the_eyes(renderer: Renderer, weights: Weights) -> None:
         return int(((pixels.min(axis=2) > 140) & (np.ptp(pixels, axis=2) < 28)).sum())
 
     def turns(**values: float) -> int:
-        there = renderer.frame(weights(**values), eyes=((0.5, 0), (0.5, 0)))
-        back = renderer.frame(weights(**values), eyes=((-0.5, 0), (-0.5, 0)))
+        there = renderer.frame(Motion.of(weights(**values), eyes=((0.5, 0), (0.5, 0))))
+        back = renderer.frame(Motion.of(weights(**values), eyes=((-0.5, 0), (-0.5, 0))))
         return int(moved(eye_region(there), eye_region(back)).sum())
 
-    assert whites(renderer.frame(weights())) > 20
-    assert whites(renderer.frame(weights(eyeBlink=1))) == 0
+    assert whites(renderer.frame(Motion.of(weights()))) > 20
+    assert whites(renderer.frame(Motion.of(weights(eyeBlink=1)))) == 0
     assert turns() > 100
     assert turns(eyeBlink=1) == 0
 
@@ -126,9 +127,9 @@ def test_neutral_mouth_is_closed(renderer: Renderer, weights: Weights) -> None:
         mouth = frame[int(0.56 * height) : int(0.76 * height), int(0.40 * width) : int(0.60 * width)].astype(int)
         return int(((mouth.min(axis=2) > 120) & (np.ptp(mouth, axis=2) < 45)).sum())
 
-    assert teeth(renderer.frame(weights(mouthUpperUp=1))) > 30
+    assert teeth(renderer.frame(Motion.of(weights(mouthUpperUp=1)))) > 30
     for pose in ({}, {"mouthPress": 1.0}, {"mouthFrown": 1.0}, {"mouthSmile": 1.0}, {"mouthPucker": 1.0}):
-        assert teeth(renderer.frame(weights(**pose))) == 0, pose
+        assert teeth(renderer.frame(Motion.of(weights(**pose)))) == 0, pose
 
 
 @pytest.mark.parametrize(
@@ -139,20 +140,22 @@ def test_head_turns_the_way_it_is_told(
     renderer: Renderer, weights: Weights, head: tuple[float, ...], direction: tuple[int, int]
 ) -> None:
     """Down is down, and the subject's left is the right of the picture."""
-    shift = centre_of_face(renderer.frame(weights(), head=head)) - centre_of_face(renderer.frame(weights()))
+    shift = centre_of_face(renderer.frame(Motion.of(weights(), head=head))) - centre_of_face(
+        renderer.frame(Motion.of(weights()))
+    )
     assert shift @ direction > 3
     assert abs(shift @ direction) > 2 * abs(shift[::-1] @ direction)
 
 
 def test_head_rolls_towards_the_subjects_right(renderer: Renderer, weights: Weights) -> None:
     """The crown goes to the left of the picture."""
-    frame = renderer.frame(weights(), head=(0, 0, 0.3))
+    frame = renderer.frame(Motion.of(weights(), head=(0, 0, 0.3)))
     dark = np.nonzero(frame[: len(frame) // 4].max(axis=2) < 70)[1]
     assert dark.mean() < 0.5 * frame.shape[1] - 10
 
 
 def test_shoulders_stay_when_the_head_turns(renderer: Renderer, weights: Weights) -> None:
-    changed = moved(renderer.frame(weights()), renderer.frame(weights(), head=(0.2, 0.35, 0.2)))
+    changed = moved(renderer.frame(Motion.of(weights())), renderer.frame(Motion.of(weights(), head=(0.2, 0.35, 0.2))))
     assert changed[: 3 * len(changed) // 4].any()
     assert changed[-len(changed) // 16 :].mean() < 0.01
 
@@ -166,7 +169,9 @@ def test_gaze_moves_the_irises(
         return float(np.argwhere(region.max(axis=2) < 110)[:, axis].mean())
 
     wide = weights(eyeWide=1)
-    assert sign * (iris(renderer.frame(wide, eyes=(gaze, gaze))) - iris(renderer.frame(wide))) > 0.3
+    assert (
+        sign * (iris(renderer.frame(Motion.of(wide, eyes=(gaze, gaze)))) - iris(renderer.frame(Motion.of(wide)))) > 0.3
+    )
 
 
 @pytest.mark.parametrize(
@@ -178,22 +183,22 @@ def test_gaze_moves_the_irises(
         ({"eyes": (0, 0)}, "eyes"),
     ],
 )
-def test_wrong_arguments_are_named(renderer: Renderer, arguments: dict[str, object], named: str) -> None:
+def test_wrong_arguments_are_named(arguments: dict[str, object], named: str) -> None:
     with pytest.raises(SpecError, match=named):
-        renderer.frame(**({"weights": np.zeros(52)} | arguments))
+        Motion.of(**({"weights": np.zeros(52)} | arguments))
 
 
 @pytest.mark.parametrize("size", [{"width": 0}, {"height": 100_000}])
-def test_impossible_sizes_are_refused(face: FaceModel, size: dict[str, int]) -> None:
+def test_impossible_sizes_are_refused(rig: Rig, size: dict[str, int]) -> None:
     with pytest.raises(SpecError, match=next(iter(size))):
-        Renderer(face, **size)
+        Renderer(rig, **size)
 
 
-def test_closed_renderer_says_so(face: FaceModel) -> None:
-    renderer = Renderer(face, width=32, height=32)
+def test_closed_renderer_says_so(rig: Rig) -> None:
+    renderer = Renderer(rig, width=32, height=32)
     renderer.close()
     with pytest.raises(RenderError, match="closed"):
-        renderer.frame(np.zeros(52))
+        renderer.frame(Motion.of())
 
 
 def test_missing_opengl_names_the_packages(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -205,9 +210,10 @@ def test_missing_opengl_names_the_packages(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_a_process_that_forgets_to_close_ends_quietly(face_dir: object) -> None:
     code = (
-        "import numpy as np, sys; from pathlib import Path;"
-        "from synth.face.mesh import load_face; from synth.render import Renderer;"
-        "r = Renderer(load_face(Path(sys.argv[1])), width=64, height=64); r.frame(np.zeros(52))"
+        "import sys; from pathlib import Path;"
+        "from synth.face.mesh import load_face; from synth.face.rig import Rig;"
+        "from synth.face.motion import Motion; from synth.render import Renderer;"
+        "r = Renderer(Rig(load_face(Path(sys.argv[1]))), width=64, height=64); r.frame(Motion.of())"
     )
     done = subprocess.run([sys.executable, "-c", code, str(face_dir)], capture_output=True, text=True, check=True)
     assert done.stdout == ""

@@ -13,6 +13,7 @@ from synth.expression.pep_fap import pep_to_fap
 from synth.face import assets
 from synth.face.deformation import solve
 from synth.face.mesh import load_face
+from synth.face.rig import Rig
 from synth.render import Renderer
 from synth.video import VideoWriter
 from webapp.cli.context import echo_json
@@ -48,18 +49,18 @@ def render(as_json: bool) -> None:
 
 def _measure(folder: Path) -> float:
     """Return the median time in seconds of several runs; the first one warms up and does not count."""
-    face = load_face(folder)
+    rig = Rig(load_face(folder))
     apex = pep_to_fap(load_model("table").predict(np.array([[0.55, 0.24, 0.28]])))[0]
     # A clip's still parts cost nothing, so they would flatter: here the smile never stops swelling and fading.
     swell = 0.5 - 0.5 * np.cos(np.linspace(0, 6 * np.pi, SECONDS * FPS))
     faps = swell[:, None] * apex
     runs = []
-    with Renderer(face, width=WIDTH, height=HEIGHT) as renderer, TemporaryDirectory() as place:
+    with Renderer(rig, width=WIDTH, height=HEIGHT) as renderer, TemporaryDirectory() as place:
         for _ in range(REPEATS + 1):
             start = time.perf_counter()
-            motion = solve(faps, face)
+            motion = solve(faps, rig)
             with VideoWriter(Path(place) / "clip.mp4", WIDTH, HEIGHT, fps=FPS) as video:
-                for weights, head, eyes in zip(motion.weights, motion.head, motion.eyes, strict=True):
-                    video.write(renderer.frame(weights, head=head, eyes=eyes))
+                for picture in renderer.frames(motion):
+                    video.write(picture)
             runs.append(time.perf_counter() - start)
     return median(runs[1:])

@@ -8,7 +8,6 @@ from synth.expression.pad_pep import word_table
 from synth.expression.pep_fap import pep_to_fap
 from synth.face.deformation import MAX_WEIGHT, moving_faps, solve
 from synth.face.feature_points import skin_rows
-from synth.face.mesh import load_face
 from synth.fap.table import FAP_COUNT, column, faps, mirrored
 from synth.fap.units import FaceUnits
 
@@ -20,16 +19,11 @@ symmetric_peps = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9).map(
 
 
 @pytest.fixture
-def face(face_dir):
-    return load_face(face_dir)
-
-
-@pytest.fixture
-def moved(face):
+def moved(face, rig):
     """Return how far feature points go when FAPs take values: {point: displacement in dm}."""
 
     def move(values, points):
-        motion = solve(values, face)
+        motion = solve(values, rig)
         rows = skin_rows(face, points)
         return dict(zip(points, np.einsum("m,mpx->px", motion.weights[0], face.morphs[:, rows]), strict=True))
 
@@ -121,59 +115,59 @@ def test_a_brow_leaves_the_mouth_alone(moved):
 
 @face_is_the_same
 @given(pep=symmetric_peps)
-def test_symmetric_expressions_have_symmetric_weights(face, pep):
-    weights = solve(pep_to_fap(pep), face).weights
+def test_symmetric_expressions_have_symmetric_weights(face, rig, pep):
+    weights = solve(pep_to_fap(pep), rig).weights
     np.testing.assert_allclose(weights, weights[:, _side_swapped(list(face.morph_names))], atol=2e-3)
 
 
 @face_is_the_same
 @given(seed=st.integers(0, 1000))
-def test_the_mirrored_face_has_mirrored_weights(face, seed):
+def test_the_mirrored_face_has_mirrored_weights(face, rig, seed):
     values = np.zeros((1, FAP_COUNT))
     rng = np.random.default_rng(seed)
     for fap in moving_faps():
         values[0, column(fap.fap)] = rng.uniform(-100, 100)
-    here, there = solve(values, face), solve(mirrored(values), face)
+    here, there = solve(values, rig), solve(mirrored(values), rig)
     np.testing.assert_allclose(there.weights, here.weights[:, _side_swapped(list(face.morph_names))], atol=5e-3)
 
 
-def test_weights_are_within_bounds(face):
+def test_weights_are_within_bounds(face, rig):
     _, _, pep = word_table()
-    weights = solve(1.5 * pep_to_fap(pep), face).weights
+    weights = solve(1.5 * pep_to_fap(pep), rig).weights
     assert weights.shape == (14, 52)
     assert weights.min() >= 0.0
     assert weights.max() <= MAX_WEIGHT
     assert weights[:, face.morph_names.index("jawOpen")].max() <= 1.0
 
 
-def test_neutral_is_still(face):
-    motion = solve(np.zeros((3, FAP_COUNT)), face)
+def test_neutral_is_still(face, rig):
+    motion = solve(np.zeros((3, FAP_COUNT)), rig)
     assert not motion.weights.any()
     assert not motion.head.any()
     assert not motion.eyes.any()
 
 
-def test_an_expression_grows_along_a_straight_line(face):
-    faint = solve(0.2 * _pep(8, 0.5), face).weights
-    np.testing.assert_allclose(solve(0.4 * _pep(8, 0.5), face).weights, 2 * faint, atol=2e-3)
+def test_an_expression_grows_along_a_straight_line(face, rig):
+    faint = solve(0.2 * _pep(8, 0.5), rig).weights
+    np.testing.assert_allclose(solve(0.4 * _pep(8, 0.5), rig).weights, 2 * faint, atol=2e-3)
 
 
-def test_frames_do_not_depend_on_each_other(face):
+def test_frames_do_not_depend_on_each_other(face, rig):
     _, _, pep = word_table()
-    together = solve(pep_to_fap(pep), face).weights
-    alone = np.vstack([solve(pep_to_fap(row[None]), face).weights for row in pep])
+    together = solve(pep_to_fap(pep), rig).weights
+    alone = np.vstack([solve(pep_to_fap(row[None]), rig).weights for row in pep])
     np.testing.assert_allclose(together, alone, atol=1e-6)
 
 
-def test_head_angles(face):
+def test_head_angles(face, rig):
     # ISO/IEC 14496-2: pitch positive down, yaw positive to the subject's left, roll positive to the subject's right.
-    motion = solve(_fap(f48=10_000, f49=20_000, f50=-5_000), face)
+    motion = solve(_fap(f48=10_000, f49=20_000, f50=-5_000), rig)
     np.testing.assert_allclose(motion.head, [[0.1, 0.2, -0.05]])
     assert not motion.weights.any()
 
 
-def test_eye_angles_and_lids_that_follow(face):
-    motion = solve(_fap(f23=10_000, f24=12_000, f25=20_000, f26=20_000), face)
+def test_eye_angles_and_lids_that_follow(face, rig):
+    motion = solve(_fap(f23=10_000, f24=12_000, f25=20_000, f26=20_000), rig)
     np.testing.assert_allclose(motion.eyes, [[[0.1, 0.2], [0.12, 0.2]]])
     weight = dict(zip(face.morph_names, motion.weights[0], strict=True))
     assert weight["eyeLookDownLeft"] == weight["eyeLookDownRight"] > 0.2
@@ -182,6 +176,6 @@ def test_eye_angles_and_lids_that_follow(face):
     assert weight["eyeLookInLeft"] == weight["eyeLookUpLeft"] == weight["eyeLookOutRight"] == 0.0
 
 
-def test_sequences_are_checked(face):
+def test_sequences_are_checked(face, rig):
     with pytest.raises(SpecError, match=r"\(frames, 68\)"):
-        solve(np.zeros(68), face)
+        solve(np.zeros(68), rig)
