@@ -21,6 +21,7 @@ from synth.expression.pad_pep import MODEL_NAMES, load_model
 from synth.expression.pep_fap import pep_to_fap, translation_digest
 from synth.face.assets import asset_digest
 from synth.face.deformation import solve
+from synth.face.identity import DEFAULT_IDENTITY
 from synth.face.mesh import load_face
 from synth.face.rig import Rig
 from synth.pad import PAD
@@ -81,7 +82,7 @@ class ClipSpec:
     pad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     model: str = "table"
     intensity: float = 1.0
-    identity: str = "default"
+    identity: str = DEFAULT_IDENTITY
     width: int = 720
     height: int = 576
     fps: int = 25
@@ -207,7 +208,7 @@ def render_still(
     face_dir: Path,
     *,
     model: str = "table",
-    identity: str = "default",
+    identity: str = DEFAULT_IDENTITY,
     width: int = 720,
     height: int = 576,
     intensity: float = 1.0,

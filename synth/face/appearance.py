@@ -7,14 +7,14 @@ from synth.face.eyes import eyeballs, lashes
 from synth.face.hair import bob
 from synth.face.mesh import FaceModel
 from synth.face.mouth import teeth, tongue
-from synth.face.painting import Palette, paint
+from synth.face.painting import paint
 from synth.face.skin import skin
 from synth.face.surface import Surface
 
 
-def dress(face: FaceModel, palette: Palette | None = None) -> tuple[list[Surface], NDArray[np.uint8]]:
+def dress(face: FaceModel) -> tuple[list[Surface], NDArray[np.uint8]]:
     """Return the surfaces of the figure, the left and the right eyeball last, and the painting they refer to."""
-    colours = palette if palette is not None else Palette()
+    colours = face.identity.palette
     bust = skin(face, colours)
     surfaces = [bust, *bob(face, bust), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
     return surfaces, paint(colours)

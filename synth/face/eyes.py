@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.mesh import FaceModel, Part
-from synth.face.painting import Palette
+from synth.face.palette import Palette
 from synth.face.surface import Surface, loose_surface
 
 Floats = NDArray[np.float64]

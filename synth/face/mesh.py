@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.errors import AssetError
 from synth.face.assets import load_compiled
 from synth.face.compilation import DELTA_SCALE, JOINTS, MASKS, POSITION_SCALE
-from synth.face.identity import IDENTITIES
+from synth.face.identity import DEFAULT_IDENTITY, Identity, find_identity
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -71,6 +70,8 @@ class FaceModel:
 
     Attributes
     ----------
+    identity : Identity
+        Whose face it is.
     vertices : (V, 3) float64
         Neutral positions.
     base_index : (V,) int64
@@ -95,6 +96,7 @@ class FaceModel:
         Raw helpers, see `PARTS`; lashes 1 are the lower, 2 the upper ones.
     """
 
+    identity: Identity
     vertices: Floats
     base_index: Indices
     quads: Indices
@@ -108,7 +110,7 @@ class FaceModel:
     parts: Mapping[str, Part]
 
 
-def load_face(face_dir: Path, identity: str = "default") -> FaceModel:
+def load_face(face_dir: Path, identity: str = DEFAULT_IDENTITY) -> FaceModel:
     """Load the face of one identity from compiled face data.
 
     Parameters
@@ -123,13 +125,12 @@ def load_face(face_dir: Path, identity: str = "default") -> FaceModel:
     AssetError
         If the data are missing or damaged, or the identity is unknown.
     """
-    if identity not in IDENTITIES:
-        raise AssetError(f"There is no identity {identity!r}; there are: {', '.join(sorted(IDENTITIES))}.")
+    chosen = find_identity(identity)
     arrays = load_compiled(face_dir)
     targets = _Targets(arrays)
     template = arrays["position"] * POSITION_SCALE
     shaped = template.copy()
-    for name, weight in IDENTITIES[identity].items():
+    for name, weight in chosen.targets.items():
         rows, delta = targets[name]
         shaped[rows] += weight * delta
     morphs = np.zeros((len(MORPH_NAMES), *shaped.shape), dtype=np.float32)
@@ -143,6 +144,7 @@ def load_face(face_dir: Path, identity: str = "default") -> FaceModel:
     balls = [shaped[np.unique(arrays[f"quads_{side}-eye"])] for side in "lr"]
     centres = np.array([ball.mean(axis=0) for ball in balls])
     return FaceModel(
+        identity=chosen,
         vertices=shaped[body],
         base_index=arrays["index"][body].astype(np.int64),
         quads=quads,

@@ -5,10 +5,11 @@ the picture covers half the head, from the middle of the face (left border) to t
 """
 
 import functools
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from synth.face.palette import Palette
 
 Floats = NDArray[np.float64]
 
@@ -20,18 +21,6 @@ _ALL_HAIR = (8.2, 8.55)
 """Heights in dm between which the painting shows hair at each angle."""
 _SLOPE, _NECK_RADIUS = 1.3, 0.5
 """The shoulders spread away from the axis: their distance beyond the neck counts as depth below it."""
-
-
-@dataclass(frozen=True)
-class Palette:
-    """Colours, sRGB from 0 to 1."""
-
-    skin: tuple[float, float, float] = (0.885, 0.715, 0.620)
-    flush: tuple[float, float, float] = (0.860, 0.560, 0.500)
-    lips: tuple[float, float, float] = (0.735, 0.395, 0.375)
-    hair: tuple[float, float, float] = (0.155, 0.115, 0.100)
-    shirt: tuple[float, float, float] = (0.300, 0.400, 0.500)
-    iris: tuple[float, float, float] = (0.340, 0.205, 0.120)
 
 
 def wrap(template: Floats) -> tuple[Floats, Floats]:

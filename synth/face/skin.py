@@ -6,7 +6,8 @@ from scipy import sparse
 
 from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
-from synth.face.painting import Palette, above_hairline, below_neckline, place, wrap
+from synth.face.painting import above_hairline, below_neckline, place, wrap
+from synth.face.palette import Palette
 from synth.face.shading import openness, smooth, vertex_normals
 from synth.face.subdivision import catmull_clark
 from synth.face.surface import Surface

@@ -9,6 +9,7 @@ import click
 from synth.clip import ClipSpec, render_clip, render_still
 from synth.expression.pad_pep import MODEL_NAMES
 from synth.face import assets
+from synth.face.identity import DEFAULT_IDENTITY
 from synth.pad import PAD
 from webapp.cli.context import NEGATIVE_NUMBERS
 from webapp.config import Settings
@@ -54,7 +55,7 @@ def _check_out(out: Path, suffix: str, *, option: str = "--out") -> None:
 @click.option(
     "--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression."
 )
-@click.option("--identity", default="default", show_default=True, help="Whose face.")
+@click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
 @click.option("--size", type=SizeType(), default="720x576", show_default=True)
 def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
     """Draw the face of the emotion P A D (pleasure, arousal, dominance, each from -1 to 1)."""
@@ -79,7 +80,7 @@ def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, 
     help="From PAD to expression; neutral shows none.",
 )
 @click.option("--mute", is_flag=True, help="Without sound (clips are silent for now, so this changes nothing yet).")
-@click.option("--identity", default="default", show_default=True, help="Whose face.")
+@click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
 @click.option("--size", type=SizeType(), default="720x576", show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Seed of the blinks.")
 @click.option("--lineage", type=click.Path(path_type=Path, dir_okay=False), help="Write how it was made (JSON).")

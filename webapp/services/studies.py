@@ -12,8 +12,8 @@ from evaluation import located_yaml
 from evaluation.errors import Problem, StudyFileError
 from evaluation.study import Cell, StudySpec
 from synth.clip import ClipSpec, clip_digest
-from synth.errors import SpecError, SynthError
-from synth.face.identity import IDENTITIES
+from synth.errors import SynthError
+from synth.face.identity import find_identity
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError
 from webapp.models import Clip, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
@@ -118,8 +118,7 @@ def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dic
 
 def _clip_spec(fields: Mapping[str, Any]) -> ClipSpec:
     clip = ClipSpec.from_dict(fields)
-    if clip.identity not in IDENTITIES:
-        raise SpecError(f"Clip: there is no identity {clip.identity!r}; there are: {', '.join(sorted(IDENTITIES))}.")
+    find_identity(clip.identity)
     return clip
 
 

@@ -96,7 +96,7 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
     [
         (("face", "1.5", "0", "0", "--out", "x.png"), ("1.5",)),
         (("face", "0", "0", "0", "--out", "nowhere/x.png"), ("does not exist", "--out")),
-        (("face", "0", "0", "0", "--out", "x.png", "--identity", "nobody"), ("nobody", "default")),
+        (("face", "0", "0", "0", "--out", "x.png", "--identity", "nobody"), ("nobody", "mei")),
         (("say", "Hi", "--out", "x.mp4", "--lineage", "nowhere/x.json"), ("does not exist", "--lineage")),
         (("study", "show", "nosuch"), ("nosuch",)),
         (("report", "nosuch"), ("nosuch",)),
@@ -166,8 +166,8 @@ def test_a_fault_of_a_condition_is_found_at_the_condition(
 ) -> None:
     source = (pytestconfig.rootpath / "tests" / "data" / "mini.yaml").read_text(encoding="utf-8")
     path = tmp_path / "who.yaml"
-    path.write_text(source.replace("{intensity: 0.4}", "{intensity: 0.4, identity: anna}"), encoding="utf-8")
-    _fails(run("study", "validate", str(path)), "who.yaml, line 12", "conditions[0].clip", "'anna'", "default")
+    path.write_text(source.replace("{intensity: 0.4}", "{intensity: 0.4, identity: nobody}"), encoding="utf-8")
+    _fails(run("study", "validate", str(path)), "who.yaml, line 12", "conditions[0].clip", "'nobody'", "mei")
 
 
 def test_the_life_of_a_study(run: object, tmp_path: Path, database: object, pytestconfig: pytest.Config) -> None:
