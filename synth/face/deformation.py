@@ -1,21 +1,27 @@
-"""From FAP values to the motion of the face: morph weights, head rotation and gaze.
+"""From FAP values to the motion of the face: morph weights, a smooth residual, head rotation and gaze.
 
 A FAP says how far a feature point goes along one axis. The morphs whose weights together bring all points nearest to
-where their FAPs want them are found by bounded least squares; points whose FAP is 0 are asked to stay.
+where their FAPs want them are found by bounded least squares; points whose FAP is 0 are asked to stay. What the morphs
+then leave to do at the points that do move is done by bumps (see `synth.face.residual`), so that a point ends where the
+standard says; a point whose FAPs are all 0 goes along with its neighbours, as flesh does.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.face.feature_points import VERTICES, skin_rows
-from synth.face.mesh import FaceModel
+from synth.face.eyes import PUPIL
+from synth.face.feature_points import VERTICES
 from synth.face.motion import Motion
+from synth.face.residual import displacing_faps
 from synth.face.rig import Rig
 from synth.fap.table import Fap, check_sequence, column, faps
-from synth.fap.units import ANGLE_UNIT, FaceUnits
+from synth.fap.units import ANGLE_UNIT, STEPS, FaceUnits
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
+
+PUPIL_RANGE = (0.5, 1.6)
+"""Narrowest and widest pupil, as a multiple of the neutral one."""
 
 MAX_WEIGHT = 2.0
 """Largest weight of any morph."""
@@ -65,18 +71,39 @@ _COST_OF = {
     **dict.fromkeys(("mouthLowerDownLeft", "mouthLowerDownRight"), 0.008),
 }
 
+# A point that a FAP displaces along one axis stays where it is along the others. The morphs are asked to see to it by
+# this factor; the bumps do the rest.
+_ACROSS_COUNT = 0.3
+
+# A point counts as driven by the share of its squared distance in the sum of that and this part of the mean square of
+# all points: nearly fully unless it moves far less than the rest, and not at all if it does not move.
+_FAINT = 0.02
+
+_LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
+_LIDS = ((19, 21), (20, 22))
+_LIP_OVERLAP = 0.004
+"""How far lips that press on each other sink in; dm."""
+_LID_CONTACT, _LID_SEAL = 0.85, 0.10
+"""The share of the neutral gap from which closing lids begin to overlap, and by how much of it they do when closed."""
+
 _STEPS = 600
 _RELAXATION = 1.6
+_BATCH = 256
+"""Frames solved at once: enough to be fast, and few enough that long clips take no more memory than short ones."""
 
 
 def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     """Find the motion that FAP values ask of a face.
 
+    Each of FAP 3 to 68 takes its feature point as far as value times FAPU, exactly, along its axis and not along the
+    others, with these limits of flesh: lips and lids that would pass through each other meet instead (a lip or lid
+    without a value of its own gives way), and closed lids overlap by a tenth of the eye's opening, so that no white is
+    seen.
+
     Parameters
     ----------
     values : (T, 68)
-        FAP values in FAPU, see `synth.fap.table`. The ears, the tongue, the depth of the eyeballs, the size of the
-        pupils and the two high-level parameters have no morphs and are left out.
+        FAP values in FAPU, see `synth.fap.table`. The two high-level parameters are left out.
     rig : Rig
         The figure, whose own feature points and units count.
 
@@ -84,7 +111,7 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     -------
     Motion
         With ``weights`` that minimise, over 0 <= w <= w_max, the sum of the squared distances along the FAPs'
-        directions and a small cost of the weights.
+        directions and a small cost of the weights, and the ``residual`` that remains.
 
     Raises
     ------
@@ -92,24 +119,30 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
         If ``values`` is not a finite (T, 68) array.
     """
     sequence = check_sequence(values)
-    face = rig.face
-    system = _System(face)
-    weights = np.zeros((len(sequence), len(face.morph_names)))
-    # Clips hold still for long: each different frame is solved once.
-    frames, place = np.unique(sequence, axis=0, return_inverse=True)
-    weights[:, system.morphs] = system.solve(frames)[place.reshape(-1)]
-    head = sequence[:, [column(48), column(49), column(50)]] * ANGLE_UNIT
+    face, units = rig.face, FaceUnits.measure(rig.face)
     left = sequence[:, [column(23), column(25)]]
     right = sequence[:, [column(24), column(26)]]
     eyes = np.stack([left, right], axis=1) * ANGLE_UNIT
+    weights = np.zeros((len(sequence), len(face.morph_names)))
     _follow_gaze(weights, eyes, face.morph_names)
+    morphs, points = _System(rig), _Residual(rig)
+    residual = np.zeros((len(sequence), len(rig.control.names), 3))
+    # Clips hold still for long: each different frame is solved once.
+    frames, first, place = np.unique(sequence, axis=0, return_index=True, return_inverse=True)
+    own_weights, own_residual = weights[first], residual[first]
+    for start in range(0, len(frames), _BATCH):
+        batch = slice(start, start + _BATCH)
+        targets, driven = points.targets(frames[batch])
+        own_weights[batch, morphs.morphs] = morphs.solve(frames[batch], driven)
+        own_residual[batch] = points.remaining(targets, driven, own_weights[batch])
+    pupil = 2.0 * face.eye_radius * np.sin(PUPIL)
     return Motion(
-        weights=weights,
-        head=head,
+        weights=own_weights[place.reshape(-1)],
+        head=sequence[:, [column(48), column(49), column(50)]] * ANGLE_UNIT,
         eyes=eyes,
-        thrust=np.zeros((len(sequence), 2)),
-        pupils=np.ones((len(sequence), 2)),
-        residual=np.zeros((len(sequence), 0, 3)),
+        thrust=sequence[:, [column(27), column(28)]] * units.ES / STEPS,
+        pupils=np.clip(1.0 + sequence[:, [column(29), column(30)]] * units.IRISD / STEPS / pupil, *PUPIL_RANGE),
+        residual=own_residual[place.reshape(-1)],
     )
 
 
@@ -126,13 +159,14 @@ def moving_faps() -> tuple[Fap, ...]:
 class _System:
     """The least-squares problem of one face: ``A w = b`` with rows for FAPs and columns for morphs."""
 
-    def __init__(self, face: FaceModel) -> None:
+    def __init__(self, rig: Rig) -> None:
+        face, points = rig.face, list(rig.control.names)
         rows = moving_faps()
         names = [name for name in face.morph_names if not name.startswith("eyeLook") and name != "tongueOut"]
         self.morphs = np.array([face.morph_names.index(name) for name in names])
-        points = skin_rows(face, [fap.points[0] for fap in rows])
+        self._points = np.array([points.index(fap.points[0]) for fap in rows])
         directions = np.array([fap.direction for fap in rows])
-        reach = np.einsum("mfx,fx->fm", face.morphs[self.morphs][:, points].astype(np.float64), directions)
+        reach = np.einsum("mfx,fx->fm", rig.control.reach[self.morphs][:, self._points], directions)
         self._columns = np.array([column(fap.fap) for fap in rows])
         reach = _symmetrised(reach, rows, names)
         self._steps = FaceUnits.measure(face).steps()[self._columns]
@@ -143,7 +177,13 @@ class _System:
         self._gaps = np.zeros((len(_LIP_GAPS), len(rows)))
         for k, pair in enumerate(_LIP_GAPS):
             self._gaps[k, [numbers.index(fap) for fap in pair]] = 1.0
-        self._reach = np.vstack([reach, self._gaps @ reach])
+        moved = {(points.index(fap.points[0]), int(np.abs(fap.direction or (0,)).argmax())) for fap in rows}
+        across = [
+            (p, axis) for p in dict.fromkeys(self._points.tolist()) for axis in range(3) if (p, axis) not in moved
+        ]
+        self._across = np.array([p for p, _ in across])
+        aside = np.array([rig.control.reach[self.morphs, p, axis] for p, axis in across])
+        self._reach = np.vstack([reach, self._gaps @ reach, aside])
         self._limit = np.array([_LIMIT_OF.get(name, _LIMIT) for name in names])
         regions = [_REGION_OF_GROUP[fap.group] for fap in rows]
         self._same_region = np.array([[one == other for one in regions] for other in regions], dtype=np.float64)
@@ -152,13 +192,27 @@ class _System:
         self._moving_count[self._cheeks] = _LIFT_COUNT
         self._staying_count = np.array([_STAY_COUNT * _count(fap) for fap in rows])
 
-    def solve(self, sequence: Floats) -> Floats:
-        """Return the weights (T, M) of the system's morphs for all frames at once."""
+    def solve(self, sequence: Floats, driven: Floats) -> Floats:
+        """Return the weights (T, M) of the system's morphs for all frames at once.
+
+        Parameters
+        ----------
+        sequence : (T, 68)
+            FAP values.
+        driven : (T, P)
+            How much each control point is driven, 0 to 1.
+        """
         distances = sequence[:, self._columns] * self._steps
         still = distances[:, self._cheeks] == 0.0
         distances[:, self._cheeks] += still * _LIFT * np.maximum(distances[:, self._corners], 0.0)
-        counts = np.hstack([self._counts(distances), np.full((len(distances), len(_LIP_GAPS)), _GAP_COUNT)])
-        distances = np.hstack([distances, distances @ self._gaps.T])
+        counts = np.hstack(
+            [
+                self._counts(distances),
+                np.full((len(distances), len(_LIP_GAPS)), _GAP_COUNT),
+                _ACROSS_COUNT * driven[:, self._across],
+            ]
+        )
+        distances = np.hstack([distances, distances @ self._gaps.T, np.zeros((len(distances), len(self._across)))])
         normal = np.einsum("tf,fm,fn->tmn", counts**2, self._reach, self._reach, optimize=True) + self._cost
         wanted = (distances * counts**2) @ self._reach
         return _bounded_least_squares(normal, wanted, self._limit)
@@ -173,6 +227,88 @@ class _System:
         moving: Floats = squares / np.maximum(squares + squares @ self._same_region.T, 1e-30)
         counts: Floats = self._staying_count + (self._moving_count - self._staying_count) * moving
         return counts
+
+
+class _Residual:
+    """Where the control points of one figure are to go, and what the morphs leave to do."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._reach, self._kernel = rig.control.reach, rig.control.kernel
+        points = rig.control.names
+        number = {name: k for k, name in enumerate(points)}
+        steps = FaceUnits.measure(rig.face).steps()
+        self._along = np.zeros((len(steps), len(points), 3))
+        for fap in displacing_faps():
+            if fap.direction is not None:
+                index = column(fap.fap)
+                self._along[index, number[fap.points[0]]] = np.multiply(fap.direction, steps[index])
+        self._upper, self._lower = np.array([[number[name] for name in pair] for pair in _LIPS]).T
+        self._borders = np.array([number["6.3"], number["6.4"]])
+        tongue = rig.rest[rig.control.rows[self._borders]].astype(np.float64)
+        self._half_width = 0.5 * (tongue[0, 0] - tongue[1, 0])
+
+    def targets(self, sequence: Floats) -> tuple[Floats, Floats]:
+        """Return where the points are to go, (T, P, 3) in dm, and how much each is driven, (T, P) from 0 to 1."""
+        targets = np.einsum("tf,fpx->tpx", _meeting_lids(sequence), self._along, optimize=True)
+        angle = sequence[:, column(47), None] * ANGLE_UNIT
+        # FAP 47 turns the tongue's borders up about its middle.
+        targets[:, self._borders, 0] -= np.array([1.0, -1.0]) * self._half_width * (1.0 - np.cos(angle))
+        targets[:, self._borders, 1] += self._half_width * np.sin(angle)
+        squares = (targets**2).sum(axis=2)
+        driven = squares / np.maximum(squares + _FAINT * squares.mean(axis=1, keepdims=True), 1e-30)
+        self._let_lips_meet(targets, driven)
+        return targets, driven
+
+    def _let_lips_meet(self, targets: Floats, driven: Floats) -> None:
+        """Let lips that would pass through each other share the way to where they meet, in place."""
+        up, low = targets[:, self._upper, 1], targets[:, self._lower, 1]
+        excess = np.maximum(low - up - _LIP_OVERLAP, 0.0)
+        # Whichever is not driven gives way.
+        yields = np.stack([1.0 - driven[:, self._upper], 1.0 - driven[:, self._lower]]) + 1e-6
+        yields /= yields.sum(axis=0)
+        targets[:, self._upper, 1] += yields[0] * excess
+        targets[:, self._lower, 1] -= yields[1] * excess
+        touching = np.where(excess > 0.0, np.maximum(driven[:, self._upper], driven[:, self._lower]), 0.0)
+        for side in (self._upper, self._lower):
+            driven[:, side] = np.maximum(driven[:, side], touching)
+
+    def remaining(self, targets: Floats, driven: Floats, weights: Floats) -> Floats:
+        """Return the bumps (T, P, 3) that take the points from where the morphs bring them to their targets.
+
+        Driven points are interpolated exactly; the less a point is driven, the more it goes along with the others.
+        Inner lip points always count: what is asked of the gap between them holds though neither is driven.
+        """
+        reached = np.einsum("tm,mpx->tpx", weights, self._reach, optimize=True)
+        share = driven[:, :, None]
+        missing = share * (targets - reached)
+        pinned = driven.copy()
+        wanted = targets[:, self._upper, 1] - targets[:, self._lower, 1]
+        opening = reached[:, self._upper, 1] - reached[:, self._lower, 1]
+        half = 0.5 * (wanted - opening)
+        for own, other, sign in ((self._upper, self._lower, 1.0), (self._lower, self._upper, -1.0)):
+            # An undriven lip keeps the wanted distance from a driven one, or goes half the way.
+            after = targets[:, other, 1] + sign * wanted - reached[:, own, 1]
+            follow = driven[:, other] * after + (1.0 - driven[:, other]) * sign * half
+            missing[:, own, 1] += (1.0 - driven[:, own]) * follow
+            pinned[:, own] = 1.0
+        count = pinned[:, :, None] * self._kernel * pinned[:, None, :]
+        count += np.eye(len(self._kernel)) * (1.0 - pinned**2)[:, :, None]
+        bumps: Floats = pinned[:, :, None] * np.linalg.solve(count, pinned[:, :, None] * missing)
+        return bumps
+
+
+def _meeting_lids(sequence: Floats) -> Floats:
+    """Return FAPs whose lids meet rather than cross, and overlap a little once they are closed."""
+    result = sequence.copy()
+    for upper, lower in _LIDS:
+        pair = [column(upper), column(lower)]
+        closing = sequence[:, pair].sum(axis=1) / STEPS
+        t = np.clip((closing - _LID_CONTACT) / (1.0 - _LID_CONTACT), 0.0, 1.0)
+        sealed = np.minimum(closing, 1.0) + _LID_SEAL * t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+        parts = np.maximum(sequence[:, pair], 0.0)
+        share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-30)
+        result[:, pair] += share * ((sealed - closing) * STEPS * (closing > _LID_CONTACT))[:, None]
+    return result
 
 
 def _count(fap: Fap) -> float:

@@ -89,8 +89,11 @@ PUPILS = ("3.5", "3.6")
 SPINE = "7.1"
 """Point 7.1, the top of the spine, about which the head turns."""
 
+TONGUE_START = 13380
+"""Number in ``base.obj`` of the tongue's first vertex."""
+
 # The loose parts are runs of base.obj; their rows in FaceModel.parts follow the same order.
-_PART_START = {"tongue": 13380, "lower-teeth": 14992, "upper-teeth": 15060}
+_PART_START = {"tongue": TONGUE_START, "lower-teeth": 14992, "upper-teeth": 15060}
 
 
 def skin_rows(face: FaceModel, names: Iterable[str]) -> Indices:

@@ -9,6 +9,7 @@ from synth.face.appearance import dress
 from synth.face.eyes import EYES
 from synth.face.mesh import FaceModel
 from synth.face.motion import Motion
+from synth.face.residual import ControlPoints
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ class Rig:
         The same.
     spans : dict of str to slice
         Rows of each surface, by its name.
+    control : ControlPoints
+        The feature points that FAPs displace.
     rest : (N, 3) float32
         Neutral positions in dm.
     triangles : (T, 3) uint32
@@ -64,6 +67,7 @@ class Rig:
         self.paint = np.concatenate(
             [np.column_stack([s.colour**2 * (s.cover * s.shade)[:, None], (1 - s.cover) * s.shade]) for s in surfaces]
         ).astype(np.float32)
+        self.control = ControlPoints(face, surfaces)
         self._rest = rest
         self._quads = quads
         # One sequential sparse product: the same result on each run, and most morphs move few vertices.
@@ -77,10 +81,12 @@ class Rig:
     def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
         """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion."""
         positions = self._rest + (self._morphs @ motion.weights[frame]).reshape(-1, 3)
+        if motion.residual.shape[1]:
+            positions += self.control.basis @ motion.residual[frame]
         for eye, name in enumerate(EYES):
             span, centre = self.spans[name], self.face.eye_centres[eye]
             turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
-            positions[span] = (self._rest[span] - centre) @ turn.T + centre
+            positions[span] = (self._rest[span] - centre) @ turn.T + centre + (0, 0, motion.thrust[frame, eye])
         positions = self._turns.apply(positions, motion.head[frame])
         return positions, self._normals(positions)
 

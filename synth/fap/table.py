@@ -54,6 +54,8 @@ class Fap:
         The same parameter of the other half of the face.
     twin : int or None
         The inner lip parameter of an outer one, and back.
+    usable : tuple of float or None
+        Smallest and largest value that look natural, padlab's own choice; None for the two high-level parameters.
     quantum : int
         Step of the coded value.
     moves : str
@@ -69,6 +71,7 @@ class Fap:
     points: tuple[str, ...]
     mirror: int | None
     twin: int | None
+    usable: tuple[float, float] | None
     quantum: int
     moves: str
 
@@ -88,7 +91,12 @@ def faps() -> Mapping[int, Fap]:
     """Return the parameters by number."""
     text = resources.files("synth.data").joinpath("fap.json").read_text(encoding="utf-8")
     rows = json.loads(text)["faps"]
-    return MappingProxyType({row["fap"]: Fap(**{**row, "points": tuple(row["points"])}) for row in rows})
+    return MappingProxyType(
+        {
+            row["fap"]: Fap(**{**row, "points": tuple(row["points"]), "usable": row["usable"] and tuple(row["usable"])})
+            for row in rows
+        }
+    )
 
 
 def column(fap: int) -> int:
