@@ -63,7 +63,7 @@ _GAP_COUNT = 1.5
 
 # Cost of a weight of 1, as a distance in dm: small, so that it only decides between morphs that do the same. Morphs
 # that are no part of an ordinary expression cost more, as those that pull the mouth to one side.
-_COST = 0.004
+_COST = 0.008
 _COST_OF = {
     **dict.fromkeys(("mouthLeft", "mouthRight", "jawLeft", "jawRight"), 0.06),
     **dict.fromkeys(("cheekPuff", "jawForward", "mouthFunnel", "mouthRollUpper"), 0.03),
@@ -78,6 +78,11 @@ _ACROSS_COUNT = 0.3
 # A point counts as driven by the share of its squared distance in the sum of that and this part of the mean square of
 # all points: nearly fully unless it moves far less than the rest, and not at all if it does not move.
 _FAINT = 0.02
+
+# No FAP says how deep the corners of the mouth lie. Drawn out or up alone they keep their depth, like all points; drawn
+# out and up at once, as in a smile, they may slide back round the teeth, as the morphs have it.
+_CORNER_DEPTH = 0.3
+_CORNERS = ("2.4", "2.5", "8.3", "8.4")
 
 _LIPS = (("2.2", "2.3"), ("2.6", "2.8"), ("2.7", "2.9"))
 _LIDS = ((19, 21), (20, 22))
@@ -182,6 +187,7 @@ class _System:
             (p, axis) for p in dict.fromkeys(self._points.tolist()) for axis in range(3) if (p, axis) not in moved
         ]
         self._across = np.array([p for p, _ in across])
+        self._deep = np.array([points[p] in _CORNERS for p, _ in across])
         aside = np.array([rig.control.reach[self.morphs, p, axis] for p, axis in across])
         self._reach = np.vstack([reach, self._gaps @ reach, aside])
         self._limit = np.array([_LIMIT_OF.get(name, _LIMIT) for name in names])
@@ -209,7 +215,7 @@ class _System:
             [
                 self._counts(distances),
                 np.full((len(distances), len(_LIP_GAPS)), _GAP_COUNT),
-                _ACROSS_COUNT * driven[:, self._across],
+                _ACROSS_COUNT * driven[:, self._across] * np.where(self._deep, _CORNER_DEPTH, 1.0),
             ]
         )
         distances = np.hstack([distances, distances @ self._gaps.T, np.zeros((len(distances), len(self._across)))])
@@ -242,6 +248,7 @@ class _Residual:
             if fap.direction is not None:
                 index = column(fap.fap)
                 self._along[index, number[fap.points[0]]] = np.multiply(fap.direction, steps[index])
+        self._corners = np.array([number[name] for name in _CORNERS])
         self._upper, self._lower = np.array([[number[name] for name in pair] for pair in _LIPS]).T
         self._borders = np.array([number["6.3"], number["6.4"]])
         tongue = rig.rest[rig.control.rows[self._borders]].astype(np.float64)
@@ -279,8 +286,8 @@ class _Residual:
         Inner lip points always count: what is asked of the gap between them holds though neither is driven.
         """
         reached = np.einsum("tm,mpx->tpx", weights, self._reach, optimize=True)
-        share = driven[:, :, None]
-        missing = share * (targets - reached)
+        missing = driven[:, :, None] * (targets - reached)
+        missing[:, self._corners, 2] *= 1.0 - _diagonal(targets[:, self._corners])
         pinned = driven.copy()
         wanted = targets[:, self._upper, 1] - targets[:, self._lower, 1]
         opening = reached[:, self._upper, 1] - reached[:, self._lower, 1]
@@ -295,6 +302,13 @@ class _Residual:
         count += np.eye(len(self._kernel)) * (1.0 - pinned**2)[:, :, None]
         bumps: Floats = pinned[:, :, None] * np.linalg.solve(count, pinned[:, :, None] * missing)
         return bumps
+
+
+def _diagonal(displacements: Floats) -> Floats:
+    """Return how evenly displacements (..., 3) go sideways and up or down at once: 0 along an axis, 1 half-way."""
+    x, y = displacements[..., 0] ** 2, displacements[..., 1] ** 2
+    even: Floats = 4.0 * x * y / np.maximum((x + y) ** 2, 1e-30)
+    return even
 
 
 def _meeting_lids(sequence: Floats) -> Floats:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from synth.face.brows import carry_brows
 from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
 from synth.face.painting import above_hairline, below_neckline, place, wrap
@@ -32,6 +33,7 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
     masks = {name: np.clip(matrix @ mask, 0, 1) for name, mask in face.masks.items()}
     ears, lips, mouth = masks["ears"], masks["lips"], masks["inside-mouth"]
     vertices = _close_mouth(face, vertices, quads, morphs, masks)
+    carry_brows(face, template, morphs)
     angle, height = wrap(template)
     hair = _step(above_hairline(angle, height), 0.0, 0.35) * (1 - _step(ears, 0.0, 0.3))
     # The sheet of hair hides the scalp, but for the parting and a margin along the hairline.
