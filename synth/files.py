@@ -1,0 +1,31 @@
+"""Files that appear complete or not at all."""
+
+import secrets
+from pathlib import Path
+
+from synth.errors import VideoError
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write a file under another name beside its own, then give it its name; text is written as UTF-8.
+
+    Parameters
+    ----------
+    path : Path
+        The file; an older one of that name is replaced. Its folder must exist.
+    content : bytes or str
+        All of it.
+
+    Raises
+    ------
+    VideoError
+        If it cannot be written; then nothing is left behind, and an older file is untouched.
+    """
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+    try:
+        partial.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
+        partial.replace(path)
+    except OSError as error:
+        raise VideoError(f"The file {path} could not be written: {error.strerror or error}.") from error
+    finally:
+        partial.unlink(missing_ok=True)
