@@ -55,7 +55,8 @@ class Fap:
     twin : int or None
         The inner lip parameter of an outer one, and back.
     usable : tuple of float or None
-        Smallest and largest value that look natural, padlab's own choice; None for the two high-level parameters.
+        Smallest and largest value that look natural when nothing else moves, padlab's own choice; None for the two
+        high-level parameters.
     quantum : int
         Step of the coded value.
     moves : str
