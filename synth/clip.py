@@ -4,9 +4,8 @@ import hashlib
 import json
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Self
@@ -20,13 +19,12 @@ from synth.expression.course import Course, blink_track, expression_track
 from synth.expression.pad_pep import MODEL_NAMES, load_model
 from synth.expression.pep_fap import pep_to_fap, translation_digest
 from synth.face.assets import asset_digest
-from synth.face.deformation import solve
-from synth.face.identity import DEFAULT_IDENTITY
-from synth.face.mesh import load_face
-from synth.face.rig import Rig
+from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
+from synth.fap.table import FAP_COUNT, check_sequence
 from synth.pad import PAD
-from synth.render import RENDERER_VERSION, Renderer
-from synth.video import VideoWriter, write_png
+from synth.render import RENDERER_VERSION
+from synth.stage import Stage
+from synth.video import write_png
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +35,6 @@ FORMAT = 1
 
 _SECONDS_PER_WORD = 0.35
 _SECONDS_PER_CHARACTER = 0.25
-_IDENTITY = re.compile(r"[a-z][a-z0-9_-]{0,39}")
 
 # Inclusive ranges of the numeric fields; a hold of 0.1 s leaves at least one frame at any frame rate.
 _REAL_RANGES = {"intensity": (0.0, 1.5), "neutral_s": (0.0, 10.0), "onset_s": (0.0, 10.0), "hold_s": (0.1, 120.0)}
@@ -95,11 +92,7 @@ class ClipSpec:
         _check_text(self.text)
         _check_choice("lang", self.lang, LANGUAGES)
         _check_choice("model", self.model, MODEL_NAMES)
-        if not isinstance(self.identity, str) or not _IDENTITY.fullmatch(self.identity):
-            raise SpecError(
-                f"Clip: identity is {self.identity!r}, but must be 1 to 40 lower-case letters, digits, - and _, "
-                "beginning with a letter."
-            )
+        _check_choice("identity", self.identity, tuple(IDENTITIES))
         # Equal specifications must be written alike, so 1 becomes 1.0 and -0.0 becomes 0.0.
         object.__setattr__(self, "pad", PAD.parse(self.pad).as_tuple())
         for name, (low, high) in _REAL_RANGES.items():
@@ -161,6 +154,15 @@ def clip_digest(spec: ClipSpec, face_dir: Path) -> str:
     return hashlib.sha256(json.dumps(_digests(spec.model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
 
 
+def clip_faps(spec: ClipSpec) -> Floats:
+    """Return the FAP values of a clip: (T, 68) float64, in FAPU."""
+    _, apex = _apex(spec.pad, spec.model, spec.intensity)
+    expression = expression_track(apex, spec.course)
+    tracks = [expression, blink_track(expression, spec.course, np.random.default_rng(spec.seed))]
+    faps: Floats = np.sum(tracks, axis=0)
+    return faps
+
+
 def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
     """Render a clip to an MP4 file; equal specifications give equal bytes.
 
@@ -184,13 +186,9 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
     AssetError, RenderError, VideoError
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
-    rig, renderer = _stage(face_dir, asset_digest(face_dir), spec.identity, spec.width, spec.height)
+    stage = Stage(face_dir, spec.identity)
+    frames = stage.film(clip_faps(spec), out, fps=spec.fps, width=spec.width, height=spec.height)
     pep, apex = _apex(spec.pad, spec.model, spec.intensity)
-    motion = solve(np.sum(_tracks(apex, spec.course, spec.seed), axis=0), rig)
-    with VideoWriter(out, spec.width, spec.height, fps=spec.fps) as video:
-        for picture in renderer.frames(motion):
-            video.write(picture)
-    frames = len(motion)
     return {
         "digest": clip_digest(spec, face_dir),
         "spec": spec.to_dict(),
@@ -198,7 +196,62 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
         "seed": spec.seed,
         "frames": frames,
         "duration_s": frames / spec.fps,
-        **_lineage(spec.pad, pep, apex, _digests(spec.model, face_dir)),
+        **_expression(spec.pad, pep, apex),
+        "digests": _digests(spec.model, face_dir),
+        "versions": _versions(),
+    }
+
+
+def render_faps(
+    values: NDArray[np.floating] | Floats,
+    out: Path,
+    face_dir: Path,
+    *,
+    fps: int = 25,
+    identity: str = DEFAULT_IDENTITY,
+    width: int = 720,
+    height: int = 576,
+) -> dict[str, Any]:
+    """Render FAP values to an MP4 file, frame after frame: a long film takes no more memory than a short one.
+
+    Parameters
+    ----------
+    values : (T, 68)
+        FAP values in FAPU, at least one frame.
+    out : Path
+        The file; it appears complete or not at all. Its folder must exist.
+    face_dir : Path
+        Folder of the compiled face data.
+    fps : int
+        Frames per second.
+    identity, width, height
+        As in `ClipSpec`.
+
+    Returns
+    -------
+    dict
+        The lineage as plain JSON values: a digest of the FAP values, identity, size, frames, duration, digests,
+        versions.
+
+    Raises
+    ------
+    SpecError
+        If an argument is not valid.
+    AssetError, RenderError, VideoError
+        If the face data are missing, OpenGL does not start, or the file cannot be written.
+    """
+    sequence = check_sequence(values)
+    frames = Stage(face_dir, identity).film(sequence, out, fps=fps, width=width, height=height)
+    faps = hashlib.sha256(np.ascontiguousarray(sequence, dtype="<f8").tobytes()).hexdigest()
+    return {
+        "identity": identity,
+        "width": width,
+        "height": height,
+        "fps": fps,
+        "frames": frames,
+        "duration_s": frames / fps,
+        "digests": {"faps": faps, "format": FORMAT, "assets": asset_digest(face_dir), "renderer": RENDERER_VERSION},
+        "versions": _versions(),
     }
 
 
@@ -239,35 +292,67 @@ def render_still(
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     point = PAD.parse(pad).as_tuple()
-    _check_choice("model", model, MODEL_NAMES)
-    rig, renderer = _stage(face_dir, asset_digest(face_dir), identity, width, height)
-    pep, apex = _apex(point, model, _real("intensity", intensity, *_REAL_RANGES["intensity"]))
-    motion = solve(apex[None, :], rig)
-    write_png(out, renderer.frame(motion))
-    asked = {"model": model, "identity": identity, "width": width, "height": height, "intensity": float(intensity)}
-    return {**asked, **_lineage(point, pep, apex, _digests(model, face_dir))}
+    for picture in draw_expressions(
+        [point], face_dir, model=model, identity=identity, width=width, height=height, intensity=intensity
+    ):
+        write_png(out, picture)
+    pep, apex = _apex(point, model, float(intensity))
+    return {
+        "model": model,
+        "identity": identity,
+        "width": width,
+        "height": height,
+        "intensity": float(intensity),
+        **_expression(point, pep, apex),
+        "digests": _digests(model, face_dir),
+        "versions": _versions(),
+    }
 
 
-@lru_cache(maxsize=2)
-def _stage(face_dir: Path, _assets: str, identity: str, width: int, height: int) -> tuple[Rig, Renderer]:
-    """Return a figure and its renderer; a process that makes many clips dresses the face once.
+def draw_expressions(
+    pads: Sequence[tuple[float, float, float]],
+    face_dir: Path,
+    *,
+    model: str = "table",
+    identity: str = DEFAULT_IDENTITY,
+    width: int = 720,
+    height: int = 576,
+    intensity: float = 1.0,
+) -> Iterator[NDArray[np.uint8]]:
+    """Draw the apex of each of several expressions.
 
-    The digest of the face data is a key of the cache, so that new data are noticed.
+    Parameters
+    ----------
+    pads : sequence of tuple of float
+        Pleasure, arousal, dominance of each, from -1 to 1.
+    face_dir : Path
+        Folder of the compiled face data.
+    model, identity, width, height, intensity
+        As in `ClipSpec`; odd sizes are welcome here.
+
+    Yields
+    ------
+    (height, width, 3) uint8
+        The pictures, sRGB.
+
+    Raises
+    ------
+    SpecError
+        If an argument is not valid.
+    AssetError, RenderError
+        If the face data are missing, or OpenGL does not start.
     """
-    rig = Rig(load_face(face_dir, identity))
-    return rig, Renderer(rig, width=width, height=height)
+    points = [PAD.parse(pad).as_tuple() for pad in pads]
+    _check_choice("model", model, MODEL_NAMES)
+    strength = _real("intensity", intensity, *_REAL_RANGES["intensity"])
+    apices = np.array([_apex(point, model, strength)[1] for point in points]).reshape(-1, FAP_COUNT)
+    yield from Stage(face_dir, identity).pictures(apices, width=width, height=height)
 
 
 def _apex(pad: tuple[float, float, float], model: str, intensity: float) -> tuple[Floats, Floats]:
     """Return the PEPs (9,) at full expression and their FAPs (68,)."""
     pep = intensity * load_model(model).predict(np.array([pad]))[0]
     return pep, pep_to_fap(pep[None, :])[0]
-
-
-def _tracks(apex: Floats, course: Course, seed: int) -> list[Floats]:
-    """Return the FAP tracks (T, 68) that add up to the clip."""
-    expression = expression_track(apex, course)
-    return [expression, blink_track(expression, course, np.random.default_rng(seed))]
 
 
 def _digests(model: str, face_dir: Path) -> dict[str, Any]:
@@ -280,17 +365,14 @@ def _digests(model: str, face_dir: Path) -> dict[str, Any]:
     }
 
 
-def _lineage(pad: tuple[float, float, float], pep: Floats, apex: Floats, digests: dict[str, Any]) -> dict[str, Any]:
-    return {
-        "pad": list(pad),
-        "pep": pep.tolist(),
-        "fap": {str(k + 1): value for k, value in enumerate(apex.tolist()) if value},
-        "digests": digests,
-        "versions": {
-            **{name: version(name) for name in ("padlab", "numpy", "pyrender")},
-            "ffmpeg": imageio_ffmpeg.get_ffmpeg_version(),
-        },
-    }
+def _expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> dict[str, Any]:
+    faps = {str(k + 1): value for k, value in enumerate(apex.tolist()) if value}
+    return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
+
+
+def _versions() -> dict[str, str]:
+    packages = {name: version(name) for name in ("padlab", "numpy", "pyrender")}
+    return packages | {"ffmpeg": imageio_ffmpeg.get_ffmpeg_version()}
 
 
 def _check_text(text: object) -> None:

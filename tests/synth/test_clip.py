@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synth import clip
-from synth.clip import ClipSpec, clip_digest, render_clip, render_still
+from synth.clip import ClipSpec, clip_digest, clip_faps, draw_expressions, render_clip, render_faps, render_still
 from synth.errors import AssetError, SpecError, VideoError
 from synth.pad import emotion_words
 
@@ -58,7 +58,7 @@ def test_equal_numbers_of_another_type_are_written_alike():
         *[("lang", "fr", "en, zh"), ("pad", (0, 0, 1.01), "D is 1.01"), ("pad", (0, 0), "three")],
         *[("model", "ann2", "table, linear"), ("intensity", 1.6, "from 0 to 1.5"), ("intensity", "1", "number")],
         *[("intensity", float("nan"), "number"), ("intensity", 10**400, "from 0 to 1.5")],
-        *[("identity", "../x", "lower-case"), ("identity", "", "lower-case"), ("width", 721, "even")],
+        *[("identity", "nobody", "one of mei"), ("identity", ["mei"], "one of mei"), ("width", 721, "even")],
         *[("width", 0, "from 16 to"), ("height", 576.0, "whole number"), ("fps", 0, "from 10 to 120")],
         *[("fps", True, "whole number"), ("neutral_s", -0.1, "from 0 to 10"), ("onset_s", 11, "from 0 to 10")],
         *[("hold_s", 0, "from 0.1 to"), ("seed", -1, "from 0 to"), ("seed", 1.5, "whole number")],
@@ -76,7 +76,8 @@ def test_unknown_fields_are_named():
         ClipSpec.from_dict({"colour": "red"})
 
 
-def test_the_digest_changes_with_every_field(face_dir):
+def test_the_digest_changes_with_every_field(face_dir, monkeypatch):
+    monkeypatch.setattr(clip, "IDENTITIES", {ClipSpec.identity: None, "other": None})
     assert set(OTHER) == {field.name for field in fields(ClipSpec)}
     digests = [clip_digest(replace(ClipSpec(), **{name: value}), face_dir) for name, value in OTHER.items()]
     digests.append(clip_digest(ClipSpec(), face_dir))
@@ -112,6 +113,39 @@ def test_equal_specifications_give_equal_bytes(face_dir, tmp_path):
     assert hashlib.sha256(first).digest() == hashlib.sha256(second).digest()
     assert one == two
     assert sorted(path.name for path in tmp_path.iterdir()) == ["one.mp4", "two.mp4"]
+
+
+def test_a_clip_is_the_film_of_its_faps(face_dir, tmp_path):
+    render_clip(TINY, tmp_path / "clip.mp4", face_dir)
+    faps = clip_faps(TINY)
+    size = {"fps": TINY.fps, "width": TINY.width, "height": TINY.height}
+    lineage = render_faps(faps, tmp_path / "faps.mp4", face_dir, **size)
+    assert (tmp_path / "clip.mp4").read_bytes() == (tmp_path / "faps.mp4").read_bytes()
+    assert json.loads(json.dumps(lineage, allow_nan=False)) == lineage
+    assert faps.shape == (12, 68)
+    assert (lineage["frames"], lineage["duration_s"]) == (12, pytest.approx(1.2))
+    other = render_faps(faps[::-1], tmp_path / "back.mp4", face_dir, **size)
+    assert other["digests"]["faps"] != lineage["digests"]["faps"]
+
+
+def test_films_of_wrong_faps_are_refused(face_dir, tmp_path):
+    for values in (np.zeros((3, 66)), np.full((3, 68), np.nan)):
+        with pytest.raises(SpecError, match="FAP"):
+            render_faps(values, tmp_path / "a.mp4", face_dir)
+    with pytest.raises(SpecError, match="even"):
+        render_faps(np.zeros((3, 68)), tmp_path / "a.mp4", face_dir, width=65)
+    with pytest.raises(VideoError, match="no frames"):
+        render_faps(np.zeros((0, 68)), tmp_path / "a.mp4", face_dir, width=64, height=48)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_expressions_are_drawn_in_their_order(face_dir):
+    pads = [(0.0, 0.0, 0.0), (0.55, 0.24, 0.28), (0.0, 0.0, 0.0)]
+    pictures = list(draw_expressions(pads, face_dir, width=64, height=48))
+    assert [picture.shape for picture in pictures] == [(48, 64, 3)] * 3
+    assert (pictures[0] == pictures[2]).all()
+    assert (pictures[0] != pictures[1]).any()
+    assert list(draw_expressions([], face_dir)) == []
 
 
 def test_lineage(face_dir, tmp_path):
@@ -155,8 +189,8 @@ def test_failures_are_told_and_leave_nothing_behind(face_dir, tmp_path):
         render_clip(TINY, tmp_path / "missing" / "clip.mp4", face_dir)
     with pytest.raises(AssetError, match="no face data"):
         render_clip(TINY, tmp_path / "clip.mp4", tmp_path)
-    with pytest.raises(AssetError, match="identity 'nobody'"):
-        render_clip(replace(TINY, identity="nobody"), tmp_path / "clip.mp4", face_dir)
+    with pytest.raises(SpecError, match=r"identity 'nobody'; there are: .*mei"):
+        render_still((0, 0, 0), tmp_path / "still.png", face_dir, identity="nobody")
     with pytest.raises(SpecError, match="intensity"):
         render_still((0, 0, 0), tmp_path / "still.png", face_dir, intensity=2.0)
     with pytest.raises(SpecError, match="model"):

@@ -1,9 +1,7 @@
 """Studies: apply a study file, open and close, look up."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -12,8 +10,7 @@ from evaluation import located_yaml
 from evaluation.errors import Problem, StudyFileError
 from evaluation.study import Cell, StudySpec
 from synth.clip import ClipSpec, clip_digest
-from synth.errors import SynthError
-from synth.face.identity import find_identity
+from synth.errors import SpecError
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError
 from webapp.models import Clip, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
@@ -105,8 +102,8 @@ def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dic
             (conditions[cell.condition], spec.clip_fields(*cell)),
         ):
             try:
-                made[cell] = _clip_spec(fields)
-            except SynthError as error:
+                made[cell] = ClipSpec.from_dict(fields)
+            except SpecError as error:
                 faults.setdefault(path, str(error))
                 break
     if faults:
@@ -114,12 +111,6 @@ def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dic
         problems = [Problem(located.line(path), located_yaml.field_name(path), fault) for path, fault in faults.items()]
         raise StudyFileError(source, sorted(problems, key=lambda problem: problem.line or 0))
     return made
-
-
-def _clip_spec(fields: Mapping[str, Any]) -> ClipSpec:
-    clip = ClipSpec.from_dict(fields)
-    find_identity(clip.identity)
-    return clip
 
 
 def _clip(session: Session, spec: ClipSpec, digest: str) -> Clip:
