@@ -10,6 +10,7 @@ from synth.face.eyes import EYES
 from synth.face.mesh import FaceModel
 from synth.face.motion import Motion
 from synth.face.residual import ControlPoints
+from synth.face.tessellation import reduced
 
 Floats = NDArray[np.float64]
 
@@ -49,19 +50,19 @@ class Rig:
 
     def __init__(self, face: FaceModel) -> None:
         self.face = face
-        surfaces, self.texture = dress(face)
+        dressed, self.texture = dress(face)
+        surfaces, pieces = reduced(face, dressed)
         starts = np.cumsum([0, *(len(surface.vertices) for surface in surfaces)])
         self.spans = {
             surface.name: slice(int(start), int(end))
             for surface, start, end in zip(surfaces, starts[:-1], starts[1:], strict=True)
         }
         rest = np.concatenate([surface.vertices for surface in surfaces])
-        quads = np.concatenate([surface.quads + start for surface, start in zip(surfaces, starts[:-1], strict=True)])
         morphs = np.concatenate([surface.morphs for surface in surfaces], axis=1, dtype=np.float32)
 
         self.rest = rest.astype(np.float32)
-        drawn = np.concatenate([surface.drawn for surface in surfaces])
-        self.triangles = quads[drawn][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.uint32)
+        triangles = [piece.triangles + start for piece, start in zip(pieces, starts[:-1], strict=True)]
+        self.triangles = np.concatenate(triangles).astype(np.uint32)
         self.uv = np.concatenate([surface.uv for surface in surfaces]).astype(np.float32)
         self.gloss = np.concatenate([surface.gloss for surface in surfaces]).astype(np.float32)
         self.paint = np.concatenate(
@@ -69,12 +70,10 @@ class Rig:
         ).astype(np.float32)
         self.control = ControlPoints(face, surfaces)
         self._rest = rest
-        self._quads = quads
+        self._quads = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts[:-1], strict=True)])
         # One sequential sparse product: the same result on each run, and most morphs move few vertices.
         self._morphs = sparse.csr_array(morphs.reshape(len(morphs), -1).T.astype(np.float64))
-        self._around = sparse.csr_array(
-            (np.ones(quads.size), (quads.ravel(), np.repeat(np.arange(len(quads)), 4))), shape=(len(rest), len(quads))
-        )
+        self._around = sparse.csr_array(sparse.block_diag([piece.around for piece in pieces]))
         follow = np.concatenate([surface.follow for surface in surfaces])
         self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
 
@@ -91,7 +90,7 @@ class Rig:
         return positions, self._normals(positions)
 
     def _normals(self, positions: Floats) -> Floats:
-        """Average the quads' area-weighted normals at each vertex."""
+        """Average the faces' area-weighted normals at each vertex."""
         a, b, c, d = (positions[self._quads[:, k]] for k in range(4))
         normals: Floats = self._around @ _cross(c - a, d - b)
         lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
