@@ -177,8 +177,7 @@ def tessellate(quads: Indices, n_control: int, *, fine: Flags, drawn: Flags) -> 
     bent: Flags = np.isin(midpoints[large], midpoints[split])
 
     pieces = [_halves(quads[small[drawn[small]]])]
-    partly: Flags = drawn.reshape(-1, 4).any(axis=1)
-    seen = partly[large]
+    seen = np.isin(large, np.flatnonzero(drawn) // 4)
     plain = ~bent.any(axis=1)
     pieces.append(_halves(corners[large[seen & plain]]))
     for quad, sides in zip(large[seen & ~plain], bent[seen & ~plain], strict=True):
