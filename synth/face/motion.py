@@ -74,5 +74,9 @@ class Motion:
 
     def changes(self) -> NDArray[np.bool_]:
         """Tell for each frame whether it differs from the one before; the first does (T,)."""
-        rows = np.concatenate([getattr(self, field.name).reshape(len(self), -1) for field in fields(self)], axis=1)
-        return np.concatenate([[True], (rows[1:] != rows[:-1]).any(axis=1)])[: len(self)]
+        changed = np.zeros(len(self), dtype=bool)
+        changed[:1] = True
+        for field in fields(self):
+            rows = getattr(self, field.name)
+            changed[1:] |= (rows[1:] != rows[:-1]).any(axis=tuple(range(1, rows.ndim)))
+        return changed
