@@ -9,7 +9,7 @@ standard says; a point whose FAPs are all 0 goes along with its neighbours, as f
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.face.eyes import PUPIL
+from synth.face.eyes import pupil_diameter
 from synth.face.landing import Landing
 from synth.face.morph_solver import MorphSolver
 from synth.face.motion import Motion
@@ -74,7 +74,7 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
         targets, driven = points.targets(frames[batch])
         own_weights[batch, morphs.morphs] = morphs.solve(frames[batch], driven)
         own_residual[batch] = points.remaining(targets, driven, own_weights[batch])
-    pupil = 2.0 * face.eye_radius * np.sin(PUPIL)
+    pupil = pupil_diameter(face)
     return Motion(
         weights=own_weights[place.reshape(-1)],
         head=sequence[:, [column(48), column(49), column(50)]] * ANGLE_UNIT,

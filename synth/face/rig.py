@@ -6,7 +6,7 @@ from scipy import sparse
 from scipy.spatial.transform import Rotation
 
 from synth.face.appearance import dress
-from synth.face.eyes import EYES
+from synth.face.eyes import EYES, pupil_growth
 from synth.face.mesh import FaceModel
 from synth.face.motion import Motion
 from synth.face.residual import ControlPoints
@@ -75,6 +75,7 @@ class Rig:
         self._morphs = sparse.csr_array(morphs.reshape(len(morphs), -1).T.astype(np.float64))
         self._around = sparse.csr_array(sparse.block_diag([piece.around for piece in pieces]))
         follow = np.concatenate([surface.follow for surface in surfaces])
+        self._pupil_growth = pupil_growth(face)
         self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
 
     def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
@@ -85,7 +86,8 @@ class Rig:
         for eye, name in enumerate(EYES):
             span, centre = self.spans[name], self.face.eye_centres[eye]
             turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
-            positions[span] = (self._rest[span] - centre) @ turn.T + centre + (0, 0, motion.thrust[frame, eye])
+            ball = self._rest[span] - centre + (motion.pupils[frame, eye] - 1.0) * self._pupil_growth
+            positions[span] = ball @ turn.T + centre + (0, 0, motion.thrust[frame, eye])
         positions = self._turns.apply(positions, motion.head[frame])
         return positions, self._normals(positions)
 

@@ -7,7 +7,7 @@ from synth.errors import SpecError
 from synth.expression.pad_pep import word_table
 from synth.expression.pep_fap import pep_to_fap
 from synth.face.deformation import solve
-from synth.face.eyes import PUPIL
+from synth.face.eyes import pupil_diameter
 from synth.face.morph_solver import MAX_WEIGHT, moving_faps
 from synth.face.motion import Motion
 from synth.face.residual import displacing_faps
@@ -166,7 +166,7 @@ def test_eyeballs_stand_out_and_push_their_lids(moved, rig, face):
 def test_pupils_grow_by_their_fap(rig, face):
     units = FaceUnits.measure(face)
     motion = solve(_fap(f29=200, f30=-100), rig)
-    neutral = 2 * face.eye_radius * np.sin(PUPIL)
+    neutral = pupil_diameter(face)
     growth = [200 * units.IRISD / STEPS / neutral, -100 * units.IRISD / STEPS / neutral]
     np.testing.assert_allclose(motion.pupils, [[1 + growth[0], 1 + growth[1]]])
 

@@ -69,3 +69,12 @@ def test_eyes_turn_about_their_centres(rig: Rig) -> None:
     )
     assert left[0] > 0.01
     assert right[1] < -0.005
+
+
+def test_a_pupil_grows_on_its_ball(rig: Rig) -> None:
+    still = Motion.of()
+    grown = Motion(still.weights, still.head, still.eyes, still.thrust, np.array([[1.5, 1.0]]), still.residual)
+    way = rig.pose(grown)[0] - rig.pose(still)[0]
+    assert 0.005 < np.linalg.norm(way[rig.spans["left-eye"]], axis=1).max() < 0.03
+    way[rig.spans["left-eye"]] = 0.0
+    assert not way.any()
