@@ -1,0 +1,1 @@
+"""Interchange: a clip's animation in the formats of other programs."""
