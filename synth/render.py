@@ -3,29 +3,29 @@
 import ctypes
 import functools
 import importlib
+import itertools
 import os
 import sys
 import threading
+import time
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from dataclasses import dataclass
 from types import ModuleType, TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.canvas import Canvas
 from synth.errors import RenderError, SpecError
 from synth.face.mesh import FaceModel
 from synth.face.motion import Motion
 from synth.face.rig import Rig
 
-RENDERER_VERSION = "1"
+RENDERER_VERSION = "2"
 """Part of a clip's identity; raise it when pictures change."""
-
-BACKGROUND = (0.800, 0.815, 0.830)
-"""Neutral backdrop, sRGB."""
 
 MIN_SIZE, MAX_SIZE = 16, 4096
 
@@ -37,10 +37,33 @@ _INSTALL = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
 _FIELD_OF_VIEW = np.radians(20.0)
 
 
+@dataclass(frozen=True)
+class StageTimes:
+    """Seconds that the stages of one frame took, one after the other.
+
+    Attributes
+    ----------
+    pose : float
+        From morph weights to vertices.
+    upload : float
+        Vertices to the graphics context, and finding out what changes in the picture.
+    draw : float
+        Drawing, four samples a pixel.
+    readback : float
+        Averaging the samples and reading the picture.
+    """
+
+    pose: float
+    upload: float
+    draw: float
+    readback: float
+
+
 class Renderer:
     """Draw one face at one size; a context manager.
 
-    All renderers of a process share one OpenGL context and may be used from several threads.
+    All renderers of a process share one OpenGL context and may be used from several threads. Only what has changed
+    since the last frame is drawn again; the result is the same, bit by bit, as if all had been.
 
     Parameters
     ----------
@@ -63,16 +86,18 @@ class Renderer:
                 raise SpecError(f"The frame's {name} is {size}; it must be from {MIN_SIZE} to {MAX_SIZE} pixels.")
         self.width, self.height = width, height
         self._rig = rig
-        with _current() as gl:
-            self._drawing = gl.drawing(width, height)
+        self._closed = False
+        with _current() as graphics:
+            at, field_of_view = _camera(rig.face, width, height)
+            self._canvas = Canvas(
+                *(graphics.gl, graphics.pyrender, rig),
+                camera_at=at,
+                field_of_view=field_of_view,
+                width=width,
+                height=height,
+            )
             # Also at the interpreter's end, while OpenGL still works.
-            self._free = weakref.finalize(self, _delete, self._drawing)
-            self._mesh = gl.mesh(self._rig)
-            self._scene = gl.scene(self._mesh, *_camera(rig.face, width, height))
-            positions, normals = rig.pose(Motion.of())
-            self._vertices = gl.vertices(self._rig, positions, normals)
-            # The first drawing creates the buffers that later frames write to.
-            gl.draw(self._drawing, self._scene)
+            self._free = weakref.finalize(self, _delete, self._canvas)
 
     def frame(self, motion: Motion, frame: int = 0) -> NDArray[np.uint8]:
         """Draw one frame of a motion.
@@ -87,28 +112,48 @@ class Renderer:
         RenderError
             If the renderer is closed, or OpenGL fails.
         """
-        if self._mesh is None:
-            raise RenderError("The renderer is closed; make a new one.")
-        positions, normals = self._rig.pose(motion, frame)
-        with _current() as gl:
-            # Inside the lock: clips of several threads may share this renderer.
-            self._vertices[:, 0:3] = positions
-            self._vertices[:, 3:6] = normals
-            gl.upload(self._mesh, self._vertices)
-            return gl.draw(self._drawing, self._scene)
+        pose = self._pose(motion, frame)
+        with self._open() as canvas:
+            return canvas.picture(pose)
 
     def frames(self, motion: Motion) -> Iterator[NDArray[np.uint8]]:
-        """Draw all frames of a motion, one after the other; a pose that does not change is drawn once."""
-        picture: NDArray[np.uint8] | None = None
-        for frame, changed in enumerate(motion.changes()):
-            if picture is None or changed:
-                picture = self.frame(motion, frame)
-            yield picture
+        """Draw all frames of a motion, one after the other; a pose that does not change is drawn once.
+
+        While one frame is rasterised the next one is posed, and while the caller has one the next one is rasterised.
+        """
+        starts = np.flatnonzero(motion.changes()).tolist()
+        if not starts:
+            return
+        pose = self._pose(motion, 0)
+        with self._open() as canvas:
+            canvas.show(pose)
+        for start, end in itertools.pairwise([*starts, len(motion)]):
+            following = self._pose(motion, end) if end < len(motion) else None
+            with self._open() as canvas:
+                picture = canvas.picture(pose)
+                if following is not None:
+                    canvas.show(following)
+                    pose = following
+            yield from itertools.repeat(picture, end - start)
+
+    def timed_frame(self, motion: Motion, frame: int = 0) -> tuple[NDArray[np.uint8], StageTimes]:
+        """Draw one frame as `frame` does, waiting for the end of each stage, and say how long they took."""
+        times = [time.perf_counter()]
+        pose = self._pose(motion, frame)
+        times.append(time.perf_counter())
+        with self._open() as canvas:
+            for step in (functools.partial(canvas.upload, pose), canvas.draw):
+                step()
+                canvas.finish()
+                times.append(time.perf_counter())
+            picture = canvas.read()
+        times.append(time.perf_counter())
+        return picture, StageTimes(*np.diff(times).tolist())
 
     def close(self) -> None:
         """Free what the graphics context holds for this renderer; a second call does nothing."""
         self._free()
-        self._mesh = None
+        self._closed = True
 
     def __enter__(self) -> Self:
         return self
@@ -118,10 +163,21 @@ class Renderer:
     ) -> None:
         self.close()
 
+    def _pose(self, motion: Motion, frame: int) -> NDArray[np.float32]:
+        return np.hstack(self._rig.pose(motion, frame)).astype(np.float32)
 
-def _delete(drawing: Any) -> None:
+    @contextmanager
+    def _open(self) -> Iterator[Canvas]:
+        """Lend the canvas to this thread alone."""
+        with _current():
+            if self._closed:
+                raise RenderError("The renderer is closed; make a new one.")
+            yield self._canvas
+
+
+def _delete(canvas: Canvas) -> None:
     with _current():
-        drawing.delete()
+        canvas.delete()
 
 
 def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:
@@ -204,8 +260,8 @@ class _Graphics:
             ) from error
 
     def _start(self, name: str) -> None:
-        self._pyrender = importlib.import_module("pyrender")
-        self._gl = importlib.import_module("OpenGL.GL")
+        self.pyrender = importlib.import_module("pyrender")
+        self.gl = importlib.import_module("OpenGL.GL")
         self._egl = importlib.import_module("OpenGL.EGL") if name == "egl" else None
         self.failures = importlib.import_module("OpenGL.error").Error
         platform = importlib.import_module(f"pyrender.platforms.{name}")
@@ -218,65 +274,3 @@ class _Graphics:
         egl = self._egl
         if egl is not None:
             egl.eglMakeCurrent(self.platform._egl_display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
-
-    def drawing(self, width: int, height: int) -> Any:
-        """Make a frame buffer with its own programs, which read this package's shaders."""
-        drawing = self._pyrender.Renderer(width, height)
-        # pyrender would also read the depths back, which takes longer than drawing.
-        drawing._read_main_framebuffer = functools.partial(self._read_colours, drawing)
-        drawing._program_cache.shader_dir = str(Path(__file__).parent / "shaders")
-        return drawing
-
-    def _read_colours(self, drawing: Any, scene: Any, flags: int) -> NDArray[np.uint8]:
-        """Resolve the multisampled picture and read it, top row first."""
-        gl = self._gl
-        width, height = drawing._main_fb_dims
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, drawing._main_fb_ms)
-        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, drawing._main_fb)
-        gl.glBlitFramebuffer(0, 0, width, height, 0, 0, width, height, gl.GL_COLOR_BUFFER_BIT, gl.GL_LINEAR)
-        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, drawing._main_fb)
-        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
-        pixels = gl.glReadPixels(0, 0, width, height, gl.GL_RGB, gl.GL_UNSIGNED_BYTE)
-        return np.frombuffer(pixels, dtype=np.uint8).reshape(height, width, 3)[::-1].copy()
-
-    def vertices(self, rig: Rig, positions: NDArray[Any], normals: NDArray[Any]) -> NDArray[np.float32]:
-        """Lay all attributes side by side, as pyrender's vertex buffer has them."""
-        return np.hstack([positions, normals, rig.uv, rig.gloss, rig.paint]).astype(np.float32)
-
-    def mesh(self, rig: Rig) -> Any:
-        clamp = self._gl.GL_CLAMP_TO_EDGE
-        # One level of the picture's pyramid instead of a blend of two: a good deal faster in software.
-        sampler = self._pyrender.Sampler(minFilter=self._gl.GL_LINEAR_MIPMAP_NEAREST, wrapS=clamp, wrapT=clamp)
-        texture = self._pyrender.Texture(source=rig.texture, source_channels="RGB", sampler=sampler)
-        material = self._pyrender.MetallicRoughnessMaterial(baseColorTexture=texture, doubleSided=False)
-        primitive = self._pyrender.Primitive(
-            positions=rig.rest,
-            normals=rig.rest,
-            texcoord_0=rig.uv,
-            texcoord_1=rig.gloss,
-            color_0=rig.paint,
-            indices=rig.triangles,
-            material=material,
-        )
-        return self._pyrender.Mesh([primitive])
-
-    def scene(self, mesh: Any, camera_at: NDArray[np.float64], field_of_view: float) -> Any:
-        scene = self._pyrender.Scene(bg_color=(*BACKGROUND, 1.0))
-        scene.add(mesh)
-        pose = np.eye(4)
-        pose[:3, 3] = camera_at
-        scene.add(self._pyrender.PerspectiveCamera(yfov=field_of_view, znear=1.0, zfar=100.0), pose=pose)
-        return scene
-
-    def upload(self, mesh: Any, vertices: NDArray[np.float32]) -> None:
-        """Write new vertices into the mesh's existing buffer."""
-        buffer = mesh.primitives[0]._buffers[0]
-        self._gl.glBindBuffer(self._gl.GL_ARRAY_BUFFER, buffer)
-        self._gl.glBufferSubData(self._gl.GL_ARRAY_BUFFER, 0, vertices.nbytes, vertices)
-        self._gl.glBindBuffer(self._gl.GL_ARRAY_BUFFER, 0)
-
-    def draw(self, drawing: Any, scene: Any) -> NDArray[np.uint8]:
-        """Draw and read the colours back."""
-        flags = self._pyrender.RenderFlags.OFFSCREEN
-        frame: NDArray[np.uint8] = drawing.render(scene, flags)
-        return frame

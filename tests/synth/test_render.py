@@ -1,12 +1,18 @@
+import hashlib
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from synth import render
+from synth.canvas import BACKGROUND
 from synth.errors import RenderError, SpecError
 from synth.face.motion import Motion
 from synth.face.rig import Rig
@@ -38,6 +44,12 @@ def centre_of_face(frame: np.ndarray) -> np.ndarray:
     return np.array([columns.mean(), rows.mean()])
 
 
+def swaying(weights: Weights, n: int) -> Motion:
+    """A motion of ``n`` frames, two of which are alike."""
+    frames = [Motion.of(weights(jawOpen=0.1 * (k // 2)), head=(0.0, 0.02 * (k // 2), 0.0)) for k in range(n)]
+    return Motion(*(np.concatenate([getattr(one, field.name) for one in frames]) for field in fields(Motion)))
+
+
 @pytest.mark.parametrize("size", [(320, 256), (144, 180), (181, 97)])
 def test_frames_have_the_size_asked_for(rig: Rig, weights: Weights, size: tuple[int, int]) -> None:
     with Renderer(rig, width=size[0], height=size[1]) as renderer:
@@ -49,7 +61,7 @@ def test_frames_have_the_size_asked_for(rig: Rig, weights: Weights, size: tuple[
 
 def test_head_is_framed_with_room_around_it(renderer: Renderer, weights: Weights) -> None:
     frame = renderer.frame(Motion.of(weights()))
-    background = np.round(np.array(render.BACKGROUND) * 255)
+    background = np.round(np.array(BACKGROUND) * 255)
     figure = (np.abs(frame - background) > 3).any(axis=2)
     assert not figure[: len(figure) // 20].any()
     assert figure[-1].mean() > 0.5
@@ -72,6 +84,69 @@ def test_equal_input_gives_equal_frames(renderer: Renderer, rig: Rig, weights: W
     assert (renderer.frame(Motion.of(weights(jawOpen=0.5, mouthSmile=0.3), **pose)) == first).all()
     with Renderer(rig, width=320, height=256) as other:
         assert (other.frame(Motion.of(weights(jawOpen=0.5, mouthSmile=0.3), **pose)) == first).all()
+
+
+poses = st.builds(
+    lambda jaw, brow, blink, head, eyes: {"values": (jaw, brow, blink), "head": head, "eyes": eyes},
+    *[st.sampled_from([0.0, 0.3, 1.0])] * 3,
+    st.sampled_from([(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.05, -0.1, 0.02), (0.3, 0.4, -0.3)]),
+    st.sampled_from([((0.0, 0.0), (0.0, 0.0)), ((0.2, 0.1), (0.2, 0.1))]),
+)
+
+
+@given(sequence=st.lists(poses, min_size=2, max_size=8))
+@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_what_was_drawn_before_never_shows(
+    rig: Rig, renderer: Renderer, weights: Weights, sequence: list[dict[str, Any]]
+) -> None:
+    """Only what changes is drawn anew, and yet each picture is the one that a fresh renderer makes."""
+    for pose in sequence:
+        jaw, brow, blink = pose["values"]
+        motion = Motion.of(weights(jawOpen=jaw, browInnerUp=brow, eyeBlink=blink), head=pose["head"], eyes=pose["eyes"])
+        drawn = renderer.frame(motion)
+        with Renderer(rig, width=320, height=256) as fresh:
+            assert (fresh.frame(motion) == drawn).all()
+
+
+def test_frames_that_are_drawn_ahead_are_the_same(renderer: Renderer, weights: Weights) -> None:
+    motion = swaying(weights, 6)
+    expected = [renderer.frame(motion, k) for k in range(len(motion))]
+    found = list(renderer.frames(motion))
+    assert len(found) == len(expected)
+    assert all((a == b).all() for a, b in zip(found, expected, strict=True))
+    assert list(renderer.frames(motion[:0])) == []
+
+
+def test_frames_of_two_clips_may_alternate(renderer: Renderer, weights: Weights) -> None:
+    motion = swaying(weights, 6)
+    one, other = motion[0:3], motion[3:6]
+    for k, (a, b) in enumerate(zip(renderer.frames(one), renderer.frames(other), strict=True)):
+        assert (a == renderer.frame(one, k)).all()
+        assert (b == renderer.frame(other, k)).all()
+
+
+def test_another_process_draws_the_same_bytes(renderer: Renderer, weights: Weights, face_dir: object) -> None:
+    code = (
+        "import sys, hashlib; from pathlib import Path; import numpy as np;"
+        "from synth.face.mesh import load_face; from synth.face.rig import Rig;"
+        "from synth.face.motion import Motion; from synth.render import Renderer;"
+        "w = np.zeros(52); w[[3, 20]] = 0.4, 0.7;"
+        "r = Renderer(Rig(load_face(Path(sys.argv[1]))), width=320, height=256);"
+        "f = r.frame(Motion.of(w, head=(0.1, 0.2, 0)));"
+        "print(hashlib.sha256(f.tobytes()).hexdigest())"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(face_dir)], capture_output=True, text=True, check=True)
+    w = np.zeros(52)
+    w[[3, 20]] = 0.4, 0.7
+    here = renderer.frame(Motion.of(w, head=(0.1, 0.2, 0)))
+    assert done.stdout.strip() == hashlib.sha256(here.tobytes()).hexdigest()
+
+
+def test_timed_frame_is_the_same_frame(renderer: Renderer, weights: Weights) -> None:
+    motion = swaying(weights, 2)
+    picture, times = renderer.timed_frame(motion, 1)
+    assert min(times.pose, times.upload, times.draw, times.readback) > 0
+    assert (picture == renderer.frame(motion, 1)).all()
 
 
 def test_frames_are_the_callers_own(renderer: Renderer, weights: Weights) -> None:
