@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.eyes import eyeballs, lashes
-from synth.face.hair import bob
+from synth.face.hair import loose_hair
 from synth.face.mesh import FaceModel
 from synth.face.mouth import teeth, tongue
 from synth.face.painting import paint
@@ -14,7 +14,7 @@ from synth.face.surface import Surface
 
 def dress(face: FaceModel) -> tuple[list[Surface], NDArray[np.uint8]]:
     """Return the surfaces of the figure, the left and the right eyeball last, and the painting they refer to."""
-    colours = face.identity.palette
-    bust = skin(face, colours)
-    surfaces = [bust, *bob(face, bust), *teeth(face), tongue(face), *lashes(face), *eyeballs(face, colours)]
-    return surfaces, paint(colours)
+    identity = face.identity
+    bust, nape = skin(face)
+    surfaces = [bust, nape, *loose_hair(face, bust), *teeth(face), tongue(face), *lashes(face)]
+    return [*surfaces, *eyeballs(face, identity.palette)], paint(identity.palette, identity.look)

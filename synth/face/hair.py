@@ -1,77 +1,176 @@
-"""Hair: a chin-length bob with a middle parting, as one sheet over the scalp."""
-
-from dataclasses import replace
+"""Hair: a layer over the scalp, and what hangs or stands off from it: a bob, a bun."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
+from scipy.spatial import cKDTree
 
 from synth.face.eyes import grid_quads
+from synth.face.look import Hairstyle
 from synth.face.mesh import FaceModel
-from synth.face.painting import place_strand
 from synth.face.surface import Surface
+from synth.face.wrapping import place_strand, step
 
 Floats = NDArray[np.float64]
 
-_COLUMNS, _DOME_ROWS, _FALL_ROWS = 65, 14, 10
+_COLUMNS, _HEAD_ROWS, _FALL_ROWS = 47, 9, 9
+_LINING_ROWS = _FALL_ROWS + 2
+"""Rows of the bob's dark inner side; further up the scalp is close behind the bob."""
+_LINING_GAP = 0.014
+_BUN_ROWS, _BUN_COLUMNS = 11, 24
 _BINS, _LOWEST = 72, -0.55
 """Size of the grid of directions, and its lowest elevation in radians: below the ears."""
-_GAP_AT_FACE, _GAP = 0.02, 0.055
-"""How far the sheet lies above the scalp at its front edge and elsewhere; dm."""
+_SEED = 77
 
 
-def bob(face: FaceModel, skin: Surface) -> list[Surface]:
-    """Return the outer and the dark inner side of a bob over a skin whose scalp is already thickened."""
-    outside = _sheet(face, skin)
-    matt = np.broadcast_to((0.0, 1.0), outside.gloss.shape)
-    inside = replace(outside, name="hair-inside", quads=outside.quads[:, ::-1], shade=0.3 * outside.shade, gloss=matt)
+def hair_layer(style: Hairstyle, template: Floats, inside: Floats) -> Floats:
+    """Return how far the hair stands off the scalp at each place.
+
+    Parameters
+    ----------
+    style : Hairstyle
+        The style.
+    template : (N, 3) float64
+        Places on the template; dm.
+    inside : (N,) float64
+        0 on bare skin to 1 where the hair has its full thickness.
+
+    Returns
+    -------
+    (N,) float64
+        Thickness, dm.
+    """
+    top = step(template[:, 1], 7.5, 8.15)
+    thickness = style.sides + (style.top - style.sides) * top
+    if style.strands == "curls":
+        uneven = np.random.default_rng(_SEED).standard_normal(len(template))
+    else:
+        x, y, z = template.T
+        uneven = np.sin(17.0 * x + 5.0 * z + 1.0) * np.sin(7.0 * z - 6.0 * x + 2.0) + 0.6 * np.sin(29.0 * x - 4.0 * y)
+    return inside * (thickness + style.rough * uneven)
+
+
+def hidden_scalp(style: Hairstyle, template: Floats, inside: Floats) -> NDArray[np.bool_]:
+    """Tell which places of the scalp (N,) lie under loose hair, given how far inside the hairline they are in dm."""
+    if style.loose != "bob":
+        return np.zeros(len(template), dtype=bool)
+    return (inside > 0.35) & (template[:, 1] > 7.3) & (template[:, 1] < 7.6) & (template[:, 2] < 0.4)
+
+
+def loose_hair(face: FaceModel, skin: Surface) -> list[Surface]:
+    """Return the hair that hangs or stands off, over a skin whose scalp already has its layer."""
+    style = face.identity.look.hair
+    if style.loose == "bob":
+        return _bob(face, skin)
+    return [_bun(face, skin)] if style.loose == "bun" else []
+
+
+def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
+    """Build the hanging part of a chin-length bob, and its dark lining.
+
+    Rows run from the temples down: over the head by elevation, out of the layer on the scalp, then falling to the hem
+    by height. Columns run from the left front edge round the back to the right one.
+    """
+    rng = np.random.default_rng(_SEED)
+    centre = _centre(face)
+    elevation = np.concatenate([np.linspace(0.85, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
+    fall = np.concatenate([np.zeros(_HEAD_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])[:, None]
+    share = np.linspace(0, 1, _COLUMNS)
+    left = np.interp(elevation, [0.0, 0.2, 0.5], [0.90, 0.87, 0.80]) - 0.05 * fall
+    right = left + 0.04
+    round_back = 2 * np.pi - left - right
+    angle = left + round_back * share
+    from_edge = np.minimum(share, 1 - share) * round_back
+
+    high = np.broadcast_to(elevation, angle.shape)
+    swell = 0.045 * step(from_edge, 0.0, 0.45)
+    gap = swell - (swell + 0.04) * step(high, 0.15, 0.85)
+    locks = gaussian_filter(rng.standard_normal(_COLUMNS), 0.6) * 0.014 * step(-high, -0.5, 0.0)
+    # Below the ears the hair hangs, first a little fuller, then turning in at the hem.
+    inner = np.clip(from_edge / 0.5, 0, 1)
+    curl = 0.06 * np.sin(np.pi * np.clip(fall * 1.1, 0, 1)) - (0.05 + 0.11 * inner) * fall**3
+    reach = _Reach(skin, centre)(angle, high) + gap + curl + locks
+
+    # Longest beside the chin, and uneven as hair is.
+    hem = float(face.pivots["jaw"][1]) - 0.16 + 0.24 * np.clip(from_edge / 2.2, 0, 1)
+    hem = hem + 0.010 * rng.standard_normal(_COLUMNS)
+    y = centre[1] + np.sin(high) * reach - fall * (centre[1] - hem)
+    level = np.cos(high) * reach
+    vertices = np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1)
+
+    along = np.linspace(0, 1, len(elevation))[:, None] * np.ones_like(share)
+    shade = (0.66 + 0.34 * np.clip(from_edge / 0.25, 0, 1)) * (1.0 - 0.35 * fall**2)
+    uv = place_strand(np.tile(share, len(elevation)), along.ravel())
+    # What hangs on the shoulders lags behind the head.
+    follow = np.stack([np.ones_like(shade), np.broadcast_to(1.0 - 0.22 * fall, shade.shape)], axis=-1)
+    outside = _hair_surface(face, "hair", vertices, uv=uv, shade=shade, follow=follow)
+    inwards = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
+    rows = slice(len(elevation) - _LINING_ROWS, None)
+    lining = (vertices - _LINING_GAP * inwards)[rows]
+    inside = _hair_surface(
+        face,
+        "hair-lining",
+        lining,
+        uv=uv[-lining[..., 0].size :],
+        shade=0.3 * shade[rows],
+        follow=follow[rows],
+        gloss=(0.0, 1.0),
+        inwards=True,
+    )
     return [outside, inside]
 
 
-def _sheet(face: FaceModel, skin: Surface) -> Surface:
-    """Build the sheet.
-
-    Rows run from the crown down: over the dome of the head by elevation, then falling to the hem by height.
-    Columns run from the left front edge round the back to the right one.
-    """
+def _bun(face: FaceModel, skin: Surface) -> Surface:
+    """Build a bun behind the crown: a flattened ball whose strands wind round it."""
     centre = _centre(face)
-    hem = float(face.pivots["jaw"][1]) - 0.22
-    elevation = np.concatenate([np.linspace(np.pi / 2, 0, _DOME_ROWS), np.zeros(_FALL_ROWS)])
-    fall = np.concatenate([np.zeros(_DOME_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])
-    # The front edge: from the parting outwards over the temples, then straight down beside the cheeks.
-    edge = np.interp(elevation, np.radians([0, 12, 25, 42, 60, 90]), [0.90, 0.86, 0.72, 0.40, 0.10, 0.03])
-    edge = edge - 0.04 * fall
-    share = np.linspace(0, 1, _COLUMNS)
-    angle = edge[:, None] + (2 * np.pi - 2 * edge[:, None]) * share
+    elevation = np.full(1, 0.80)
+    reach = float(_Reach(skin, centre)(np.full(1, np.pi), elevation)[0])
+    axis = np.array([0.0, np.sin(elevation[0]), -np.cos(elevation[0])])
+    up = np.array([0.0, np.cos(elevation[0]), np.sin(elevation[0])])
+    polar = np.linspace(0.0, 0.80 * np.pi, _BUN_ROWS)[:, None]
+    turn = np.linspace(0, 2 * np.pi, _BUN_COLUMNS + 1)[None, :]
+    swell = 1.0 + 0.045 * np.sin(3 * turn + 5.0 * polar) + 0.02 * np.sin(7 * turn - 3.0 * polar)
+    radius = 0.34 * np.sin(polar) * swell
+    out = (reach + 0.12 + 0.25 * np.cos(polar) * swell)[..., None]
+    vertices = (
+        centre
+        + axis * out
+        + radius[..., None] * (np.cos(turn)[..., None] * up + np.sin(turn)[..., None] * (1.0, 0.0, 0.0))
+    )
+    along = np.broadcast_to(polar / np.pi, radius.shape)
+    winding = 0.5 + 0.42 * np.cos(turn + 3.5 * polar)
+    shade = 0.95 - 0.50 * step(along, 0.45, 0.80)
+    uv = place_strand(winding.ravel(), along.ravel())
+    return _hair_surface(face, "hair", vertices, uv=uv, shade=shade, follow=np.ones((*radius.shape, 2)), inwards=True)
 
-    low, high = np.broadcast_arrays(elevation[:, None], angle)
-    reach = _Reach(skin, centre)(high, low)
-    from_edge = np.minimum(share, 1 - share) * (2 * np.pi - 2 * edge[:, None])
-    gap = _GAP_AT_FACE + (_GAP - _GAP_AT_FACE) * np.clip(from_edge / 0.35, 0, 1) ** 0.7
-    # Below the ears the hair hangs, first a little fuller, then turning in at the hem.
-    curl = 0.05 * np.sin(np.pi * np.clip(fall * 1.2, 0, 1)) - 0.13 * fall**3
-    reach = reach + gap + curl[:, None]
 
-    level = np.cos(low) * reach
-    y = centre[1] + np.sin(low) * reach - fall[:, None] * (centre[1] - hem)
-    vertices = np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1).reshape(-1, 3)
-    n = len(vertices)
-    along = np.linspace(0, 1, len(elevation))[:, None] * np.ones_like(share)
-    mirrored = np.minimum(share, 1 - share) * 2
-    shade = 0.62 + 0.38 * np.clip(from_edge / 0.30, 0, 1)
-    shade = shade * (1.0 - 0.35 * fall[:, None] ** 2)
+def _hair_surface(
+    face: FaceModel,
+    name: str,
+    vertices: Floats,
+    *,
+    uv: Floats,
+    shade: Floats,
+    follow: Floats,
+    gloss: tuple[float, float] = (0.065, 16.0),
+    inwards: bool = False,
+) -> Surface:
+    """Make a surface of a grid (rows, columns, 3) of vertices that shows the painted strands."""
+    rows, columns = vertices.shape[:2]
+    n = rows * columns
+    quads = grid_quads(rows, columns, closed=False)
     return Surface(
-        name="hair",
-        vertices=vertices,
-        quads=grid_quads(len(elevation), _COLUMNS, closed=False),
+        name=name,
+        vertices=vertices.reshape(-1, 3),
+        quads=quads[:, ::-1] if inwards else quads,
         morphs=np.zeros((len(face.morph_names), n, 3), dtype=np.float32),
-        uv=place_strand(np.tile(mirrored, len(elevation)), along.ravel()),
+        uv=uv,
         colour=np.zeros((n, 3)),
         cover=np.zeros(n),
         shade=shade.ravel(),
-        gloss=np.broadcast_to((0.065, 16.0), (n, 2)),
-        follow=np.ones((n, 2)),
-        drawn=np.ones((len(elevation) - 1) * (_COLUMNS - 1), dtype=bool),
+        gloss=np.broadcast_to(gloss, (n, 2)),
+        follow=follow.reshape(-1, 2),
+        drawn=np.ones(len(quads), dtype=bool),
     )
 
 
@@ -82,27 +181,36 @@ def _centre(face: FaceModel) -> Floats:
 
 
 class _Reach:
-    """How far the head reaches from its centre in each direction, smoothed."""
+    """How far the head reaches from its centre in each direction; low down with room for the ears."""
 
     def __init__(self, skin: Surface, centre: Floats) -> None:
         arm = skin.vertices - centre
         distance = np.linalg.norm(arm, axis=1)
         angle = np.arctan2(arm[:, 0], arm[:, 2])
         elevation = np.arcsin(arm[:, 1] / distance)
+        scalp = elevation > 0.0
+        self._scalp = cKDTree(arm[scalp] / distance[scalp, None])
+        self._distance = distance[scalp]
         head = elevation > _LOWEST
         column, row = self._bins(angle[head], elevation[head])
         reach = np.zeros((_BINS, _BINS))
         np.maximum.at(reach, (np.rint(row).astype(int), np.rint(column).astype(int) % _BINS), distance[head])
-        reach = maximum_filter(reach, size=(5, 5), mode=("nearest", "wrap"))
+        reach = maximum_filter(reach, size=(5, 3), mode=("nearest", "wrap"))
         # What hangs from the equator must clear the ears below it.
         equator = round(float(self._bins(np.zeros(1), np.zeros(1))[1][0]))
         outwards = reach[: equator + 1] * np.cos(np.linspace(_LOWEST, 0, equator + 1))[:, None]
         reach[equator] = outwards.max(axis=0)
-        self._reach = gaussian_filter(reach, 2.0, mode=("nearest", "wrap"))
+        self._ears = gaussian_filter(reach, 2.0, mode=("nearest", "wrap"))
 
     def __call__(self, angle: Floats, elevation: Floats) -> Floats:
         column, row = self._bins(angle, elevation)
-        reach: Floats = map_coordinates(self._reach, [row, column], order=1, mode="grid-wrap")
+        ears = map_coordinates(self._ears, [row, column], order=1, mode="grid-wrap")
+        level = np.cos(elevation)
+        direction = np.stack([np.sin(angle) * level, np.sin(elevation), np.cos(angle) * level], axis=-1)
+        away, near = self._scalp.query(direction, k=4)
+        weight = 1.0 / (away**2 + 1e-4)
+        scalp = (weight * self._distance[near]).sum(axis=-1) / weight.sum(axis=-1)
+        reach: Floats = ears + (scalp - ears) * step(elevation, 0.0, 0.6)
         return reach
 
     @staticmethod

@@ -1,166 +1,178 @@
-"""The painting: skin, brows, hair and clothes as one picture that is wrapped round the head.
-
-Places on it depend on the template only, so that one painting fits each identity. Left and right are mirror images:
-the picture covers half the head, from the middle of the face (left border) to the middle of the nape (right border).
-"""
+"""The painting: skin, brows, hair and clothes as one picture that is wrapped round the head."""
 
 import functools
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import zoom
 
+from synth.face.look import Look
+from synth.face.noise import Noise
 from synth.face.palette import Palette
+from synth.face.wrapping import HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step, wrap
+
+__all__ = ["HEIGHT", "WIDTH", "paint", "wrap"]
 
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1024, 1024
-_HEAD_AXIS, _NECK_AXIS = 0.4, 0.15
-"""Depth in dm of the vertical axis that the painting is wrapped round, in the head and in the neck."""
-_LOWEST, _HIGHEST = 4.4, 8.6
-_ALL_HAIR = (8.2, 8.55)
-"""Heights in dm between which the painting shows hair at each angle."""
-_SLOPE, _NECK_RADIUS = 1.3, 0.5
-"""The shoulders spread away from the axis: their distance beyond the neck counts as depth below it."""
-
-
-def wrap(template: Floats) -> tuple[Floats, Floats]:
-    """Return the angle from the middle of the face (radians, 0 to pi) and the height (dm) of places on the template."""
-    x, y = np.abs(template[:, 0]), template[:, 1]
-    below_jaw = _step(6.3 - y, 0.0, 0.6)
-    z = template[:, 2] - (_HEAD_AXIS + (_NECK_AXIS - _HEAD_AXIS) * below_jaw)
-    beyond = np.maximum(0.0, np.hypot(x, z) - _NECK_RADIUS)
-    return np.arctan2(x, z), y - _SLOPE * beyond * below_jaw
-
-
-def place(template: Floats) -> Floats:
-    """Return texture coordinates (N, 2) of places on the template (N, 3)."""
-    angle, height = wrap(template)
-    return np.column_stack([angle / np.pi, (height - _LOWEST) / (_HIGHEST - _LOWEST)])
-
-
-def place_strand(across: Floats, along: Floats) -> Floats:
-    """Return texture coordinates (N, 2) within the painted hair: across the strands 0 to 1, along them 0 to 1."""
-    lowest, highest = ((height - _LOWEST) / (_HIGHEST - _LOWEST) for height in _ALL_HAIR)
-    return np.column_stack([across, highest + (lowest - highest) * along])
-
-
-def above_hairline(angle: ArrayLike, height: ArrayLike) -> Floats:
-    """Return how far a place lies inside the hair, in dm; negative on bare skin."""
-    line_angle = [0.0, 0.25, 0.45, 0.62, 0.76, 0.88, 1.02, 1.16, 1.30, 1.50, 1.75, 2.1, np.pi]
-    line_height = [8.06, 8.05, 7.99, 7.87, 7.70, 7.50, 7.27, 7.10, 6.98, 6.78, 6.60, 6.45, 6.32]
-    line = _smooth_line(np.asarray(angle, dtype=np.float64), line_angle, line_height)
-    return np.asarray(height, dtype=np.float64) - line
-
-
-def below_neckline(angle: ArrayLike, height: ArrayLike) -> Floats:
-    """Return how far a place lies under the shirt, in dm; negative on bare skin."""
-    line = _smooth_line(
-        np.asarray(angle, dtype=np.float64), [0.0, 0.8, 1.6, 2.4, np.pi], [4.81, 4.91, 5.07, 5.25, 5.30]
-    )
-    return line - np.asarray(height, dtype=np.float64)
+_COARSE = 4
+"""The distance to the hairline is smooth: it is found for one pixel of so many across and down."""
+_SEED = 20130607
+_EVERYWHERE = 8.45
+"""Height in dm above which the painting shows nothing but hair; loose hair borrows it."""
 
 
 @functools.cache
-def paint(palette: Palette) -> NDArray[np.uint8]:
-    """Return the picture (HEIGHT, WIDTH, 3), top row first; painted once for each palette, not to be written to."""
-    columns = (np.arange(WIDTH) + 0.5) / WIDTH * np.pi
-    rows = _HIGHEST - (np.arange(HEIGHT) + 0.5) / HEIGHT * (_HIGHEST - _LOWEST)
-    angle, height = np.meshgrid(columns, rows)
-    noise = _Noise(np.random.default_rng(20130607))
-
-    picture = _skin(palette, angle, height, noise)
-    picture = _mix(picture, np.multiply(palette.hair, 1.6), 0.85 * _brow(angle, height, noise))
-    strands = noise.stretched(rough=(300, 5))
-    hair = np.multiply(palette.hair, (1.0 + 0.30 * strands)[..., None])
-    inside = above_hairline(angle, height) + 0.014 * noise.stretched(rough=(420, 10))
-    picture = _mix(picture, hair, _step(inside, -0.06, 0.07))
-    # The lowest row stands for all below it, where a pattern would be drawn out to streaks.
-    weave = 0.03 * noise.stretched(rough=(500, 500)) * _step(height, _LOWEST + 0.05, _LOWEST + 0.3)
-    shirt = np.multiply(palette.shirt, (1.0 + weave)[..., None])
-    under = below_neckline(angle, height)
-    band = 1.0 - 0.10 * _step(0.10 - under, -0.006, 0.006) - 0.12 * np.exp(-(((under - 0.10) / 0.010) ** 2))
-    picture = _mix(picture, shirt * band[..., None], _step(under, -0.005, 0.005))
+def paint(palette: Palette, look: Look) -> NDArray[np.uint8]:
+    """Return the picture (HEIGHT, WIDTH, 3), sRGB, top row first; painted once for each look, not to be written to."""
+    painter = _Painter(palette, look)
+    picture = painter.skin()
+    picture = painter.beard(picture)
+    picture = painter.brows(picture)
+    picture = painter.hair(picture)
+    picture = painter.top(picture)
     result = np.rint(255 * np.clip(picture, 0.0, 1.0)).astype(np.uint8)
     result.setflags(write=False)
     return result
 
 
-def _skin(palette: Palette, angle: Floats, height: Floats, noise: "_Noise") -> Floats:
-    """Skin with flushed cheeks, nose and chin, a shadow in the lid's fold, and a little unevenness."""
-    flush = 0.38 * _spot(angle, height, (0.52, 6.98), (0.22, 0.20))
-    flush += 0.22 * _spot(angle, height, (0.0, 6.90), (0.12, 0.12))
-    flush += 0.10 * _spot(angle, height, (0.0, 6.35), (0.20, 0.12))
-    lid = 0.30 * _spot(angle, height, (0.33, 7.375), (0.17, 0.045))
-    tone = 1.0 + 0.012 * noise.stretched(rough=(60, 60)) + 0.010 * noise.stretched(rough=(400, 400))
-    skin = _mix(np.broadcast_to(palette.skin, (*angle.shape, 3)), palette.flush, flush)
-    return _mix(skin, np.multiply(palette.skin, (0.72, 0.62, 0.60)), lid) * tone[..., None]
+class _Painter:
+    """Lays one coat after the other on pictures (HEIGHT, WIDTH, 3) of sRGB values from 0 to 1."""
 
+    def __init__(self, palette: Palette, look: Look) -> None:
+        self._palette, self._look = palette, look
+        self._noise = Noise(np.random.default_rng(_SEED), WIDTH, HEIGHT)
+        self._angle, self._height = canvas(WIDTH, HEIGHT)
+        # No face is its own mirror image.
+        self._aside = np.abs(self._angle + 0.008 * self._noise.bumps(9, 7))
+        self._up = self._height + 0.010 * self._noise.bumps(9, 7)
 
-def _brow(angle: Floats, height: Floats, noise: "_Noise") -> Floats:
-    """Return how much brow hair covers each place: a gentle arch that thins towards its tail."""
-    along = (angle - 0.135) / 0.45
-    centre = 7.510 + 0.042 * np.sin(np.clip(along, 0, 1.3) * 2.45) - 0.030 * np.clip(along, 0, 1.3) ** 2
-    half = 0.036 * np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
-    across = np.abs(height - centre) / half
-    hairs = noise.slanted(angle, height)
-    body = 1.0 - _step(across + 0.16 * hairs, 0.25, 1.35)
-    ends = _step(along, -0.10, 0.14) * (1.0 - _step(along, 0.85, 1.10))
-    return body * ends * (0.88 + 0.10 * hairs)
+    def skin(self) -> Floats:
+        """Skin: blood in cheeks, nose and chin, shadow round the eyes and in the lid's fold, a little unevenness."""
+        palette, noise = self._palette, self._noise
+        flush = 0.42 * self._spot((0.50, 6.93), (0.22, 0.18))
+        flush += 0.30 * self._spot((0.0, 6.88), (0.11, 0.10))
+        flush += 0.22 * self._spot((0.15, 6.82), (0.06, 0.07))
+        flush += 0.14 * self._spot((0.0, 6.30), (0.20, 0.10))
+        flush += 0.10 * self._spot((0.0, 7.75), (0.40, 0.12))
+        # Under the jaw the painting is drawn out, and a pattern would show as streaks.
+        even = step(self._up, 6.0, 6.3)
+        flush += (0.07 * noise.bumps(40, 50) + 0.05 * noise.bumps(150, 150)) * even
+        shadow = 0.34 * self._spot((0.33, 7.375), (0.17, 0.045))
+        shadow += 0.22 * self._spot((0.17, 7.27), (0.05, 0.10))
+        shadow += 0.13 * self._spot((0.30, 7.12), (0.16, 0.05))
+        shadow += 0.10 * self._spot((0.0, 6.44), (0.16, 0.03))
+        # The underside of the jaw gets less light from the room than its openness to the sky says.
+        shadow += 0.10 * step(-self._up, -6.15, -5.85)
+        tone = 1.0 + 0.010 * (noise.bumps(70, 60) + noise.bumps(450, 400)) * even
+        skin = _mix(np.broadcast_to(palette.skin, (HEIGHT, WIDTH, 3)), palette.flush, flush)
+        return _mix(skin, np.multiply(palette.skin, (0.70, 0.60, 0.58)), shadow) * tone[..., None]
 
+    def beard(self, base: Floats) -> Floats:
+        """Shade where a shaven beard grows: upper lip, chin, jaw and up to the sideburns."""
+        if not self._look.beard:
+            return base
+        rows = _rows(6.0, 7.2)
+        angle, height = self._aside[rows], self._up[rows]
+        cheek = 6.46 + 0.62 * step(angle, 0.45, 1.05)
+        area = step(cheek - height, -0.10, 0.12) * step(height, 6.12, 6.26) * (1 - step(angle, 1.10, 1.30))
+        lip = step(height, 6.60, 6.66) * (1 - step(height, 6.74, 6.82)) * (1 - step(angle, 0.20, 0.34))
+        corner = self._spot((0.34, 6.58), (0.09, 0.12))[rows]
+        stubble = 1.0 + 0.30 * self._noise.bumps(500, 500)[rows]
+        cover = 0.45 * self._look.beard * np.maximum(np.maximum(area, 0.9 * lip), 0.7 * corner) * stubble
+        shadow = 0.75 * np.array(self._palette.brows) + 0.20 * np.array(self._palette.skin)
+        base[rows] = _mix(base[rows], shadow, cover)
+        return base
 
-class _Noise:
-    """Smooth random pictures with values around 0, most of them within 1."""
-
-    def __init__(self, rng: np.random.Generator) -> None:
-        self._rng = rng
-
-    def stretched(self, rough: tuple[int, int]) -> Floats:
-        """Return noise with about ``rough`` bumps across and down the painting."""
-        across, down = rough
-        coarse = self._rng.standard_normal((down + 2, across + 2))
-        rows = np.linspace(0, down, HEIGHT)
-        columns = np.linspace(0, across, WIDTH)
-        partly = _lerp_rows(coarse, rows)
-        return _lerp_rows(partly.T, columns).T * 0.8
-
-    def slanted(self, angle: Floats, height: Floats) -> Floats:
-        """Return streaks that lean outwards as they rise, as brow hairs do near the nose, and flatten further out."""
-        streaks = self._rng.standard_normal(4096)
+    def brows(self, base: Floats) -> Floats:
+        """Paint each brow as an arch that thins towards its tail, with hairs."""
+        rows = _rows(7.2, 7.8)
+        brows, angle, height = self._look.brows, self._aside[rows], self._up[rows]
+        along = (angle - 0.135) / (0.45 * brows.length)
+        reach = np.clip(along, 0, 1.3)
+        centre = 7.510 + brows.raised + brows.arch * np.sin(reach * 2.45) + brows.slant * reach
+        taper = np.interp(along, [-0.1, 0.1, 0.4, 0.7, 1.0, 1.1], [0.65, 0.95, 1.0, 0.75, 0.35, 0.2])
+        across = np.abs(height - centre) / (0.036 * brows.thickness * taper)
+        # Hairs lean outwards as they rise, upright near the nose and nearly flat at the tail.
         lean = np.interp(angle, [0.1, 0.3, 0.6], [0.3, 1.5, 3.0])
-        phase = (angle - lean * (height - 7.5)) * 260.0 + 900.0
-        low = np.floor(phase).astype(int)
-        part = phase - low
-        values: Floats = 0.8 * (streaks[low % 4096] * (1 - part) + streaks[(low + 1) % 4096] * part)
-        return values
+        hairs = self._noise.at((angle - lean * (height - 7.5)) * 260.0, height * 6.0)
+        body = 1.0 - step(across + 0.16 * hairs, 0.25, 1.35)
+        ends = step(along, -0.10, 0.14) * (1.0 - step(along, 0.85, 1.10))
+        cover = brows.density * body * ends * (1.0 + 0.12 * hairs)
+        base[rows] = _mix(base[rows], self._palette.brows, cover)
+        return base
+
+    def hair(self, base: Floats) -> Floats:
+        """Lay the hair over the scalp, with strands the way the style has them."""
+        style, noise = self._look.hair, self._noise
+        right = slice(None, None, _COARSE), slice(None, WIDTH // 2, _COARSE)
+        coarse = above_hairline(style.hairline, self._angle[right], self._height[right])
+        half = zoom(coarse, _COARSE, order=1, grid_mode=True, mode="nearest")
+        inside = np.concatenate([half, half[:, ::-1]], axis=1)
+        if style.strands == "curls":
+            strands = 0.9 * noise.bumps(210, 165) + 0.8 * noise.bumps(420, 330)
+            tufts = noise.bumps(420, 330)
+        else:
+            across, along = self._flow()
+            strands = 0.75 * noise.at(across * 120, along * 2) + 0.35 * noise.at(across * 34, along)
+            tufts = 0.6 * noise.bumps(560, 20) + 0.6 * noise.bumps(150, 12)
+        if style.loose is not None:
+            hanging = 0.7 * noise.bumps(420, 3) + 0.5 * noise.bumps(130, 3)
+            strands = np.where(self._height > _EVERYWHERE, hanging, strands)
+        # Single strands catch the light, on black hair as on fair hair.
+        hair = np.multiply(self._palette.hair, (1.0 + 0.24 * strands)[..., None])
+        hair += 0.05 * np.maximum(strands, 0.0)[..., None]
+        if style.parting is not None:
+            # The scalp shows through, less and less towards the crown.
+            off = (self._angle - style.parting) * np.cos(np.clip(self._height - 7.4, 0, 1.5))
+            line = np.exp(-((off / 0.016) ** 2)) * (1 - step(self._height, 8.10, 8.45)) * step(self._height, 7.7, 7.8)
+            hair = _mix(hair, self._palette.skin, 0.30 * line)
+        # The hair shades the skin along its edge.
+        shaded = base * (1.0 - 0.16 * step(inside, -0.16, 0.0))[..., None]
+        return _mix(shaded, hair, step(inside + style.ragged * tufts, -0.5 * style.soft, 0.5 * style.soft))
+
+    def _flow(self) -> tuple[Floats, Floats]:
+        """Return coordinates across and along the strands, in radians or dm.
+
+        The head is taken for an ellipsoid, which is good enough to lead strands along.
+        """
+        angle, height = self._angle, self._height
+        level = np.sqrt(np.clip(1.0 - (np.clip(height - 7.3, 0.0, 1.55) / 1.6) ** 2, 0.0, 1.0))
+        x, z = 0.75 * level * np.sin(angle), 0.95 * level * np.cos(angle)
+        if self._look.hair.strands == "back":
+            # Round the place behind the crown where it is tied.
+            return np.arctan2(x, height - 6.6), z
+        if self._look.hair.strands == "aside":
+            # Round an axis from ear to ear, which bends the strands down and a little forward.
+            return np.arctan2(z + 0.15 * np.abs(x), height - 5.6), x
+        return angle, height
+
+    def top(self, base: Floats) -> Floats:
+        """Lay the top over the shoulders, with a ribbed band along its edge and its shadow on the skin."""
+        noise, band = self._noise, self._look.neckline.band
+        # The lowest row stands for all below it, where a pattern would be drawn out to streaks.
+        fading = step(self._height, LOWEST + 0.05, LOWEST + 0.3)
+        weave = (0.025 * noise.bumps(700, 500) + 0.03 * noise.bumps(30, 24)) * fading
+        under = below_neckline(self._look.neckline, self._angle, self._height)
+        ribs = 0.03 * np.sin(self._angle * 130.0) * step(under, 0.0, 0.01) * (1 - step(under, band - 0.01, band))
+        seam = 0.12 * np.exp(-(((under - band) / 0.012) ** 2))
+        shirt = np.multiply(self._palette.shirt, (1.0 + weave + ribs - seam)[..., None])
+        shaded = base * (1.0 - 0.22 * step(under, -0.12, 0.0))[..., None]
+        return _mix(shaded, shirt, step(under, -0.006, 0.006))
+
+    def _spot(self, centre: tuple[float, float], radius: tuple[float, float]) -> Floats:
+        across, down = (self._aside - centre[0]) / radius[0], (self._up - centre[1]) / radius[1]
+        spot: Floats = np.exp(-(across**2) - down**2)
+        return spot
 
 
-def _lerp_rows(values: Floats, rows: Floats) -> Floats:
-    low = np.floor(rows).astype(int)
-    part = (rows - low)[:, None]
-    between: Floats = values[low] * (1 - part) + values[low + 1] * part
-    return between
-
-
-def _smooth_line(x: Floats, knots: list[float], values: list[float]) -> Floats:
-    """Interpolate linearly over an averaged, finer line: no kinks at the knots."""
-    fine = np.linspace(0, np.pi, 400)
-    line = np.interp(np.concatenate([-fine[25:0:-1], fine, np.pi + fine[1:26]]), knots, values)
-    kernel = np.hanning(53)[1:-1]
-    smooth: Floats = np.interp(x, fine, np.convolve(line, kernel / kernel.sum(), mode="valid"))
-    return smooth
+def _rows(low: float, high: float) -> slice:
+    """Return the rows of the painting between two heights."""
+    top, bottom = ((HIGHEST - height) / (HIGHEST - LOWEST) * HEIGHT for height in (high, low))
+    return slice(int(top), int(bottom))
 
 
 def _mix(base: Floats, over: ArrayLike, cover: Floats) -> Floats:
     mixed: Floats = base + (np.asarray(over) - base) * np.clip(cover, 0.0, 1.0)[..., None]
     return mixed
-
-
-def _spot(angle: Floats, height: Floats, centre: tuple[float, float], radius: tuple[float, float]) -> Floats:
-    spot: Floats = np.exp(-(((angle - centre[0]) / radius[0]) ** 2) - ((height - centre[1]) / radius[1]) ** 2)
-    return spot
-
-
-def _step(x: Floats, low: float, high: float) -> Floats:
-    t = np.clip((x - low) / (high - low), 0.0, 1.0)
-    step: Floats = t * t * (3 - 2 * t)
-    return step

@@ -1,31 +1,37 @@
 """Skin, hair and clothes: the subdivided body mesh with its paint."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
 from synth.face.brows import carry_brows
+from synth.face.hair import hair_layer, hidden_scalp
 from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
-from synth.face.painting import above_hairline, below_neckline, place, wrap
-from synth.face.palette import Palette
 from synth.face.shading import openness, smooth, vertex_normals
 from synth.face.subdivision import catmull_clark
-from synth.face.surface import Surface
+from synth.face.surface import Surface, detach
+from synth.face.wrapping import MIDDLE, above_hairline, below_neckline, mirrored, place, step, wrap
 
 Floats = NDArray[np.float64]
 
 _MOUTH = np.array([0.40, 0.16, 0.16])
-_UPPER_LID, _LOWER_LID = np.array([0.16, 0.11, 0.10]), np.array([0.48, 0.30, 0.27])
-_HAIR_THICKNESS, _SHIRT_THICKNESS = 0.10, 0.035
-"""How far hair and shirt stand off the skin; dm."""
+_UPPER_LID, _LOWER_LID = np.array([0.16, 0.11, 0.10]), np.array([0.54, 0.42, 0.435])
+"""Margins of the lids: the upper in its own dark colour, the lower as a part of the skin's."""
+_TOP_THICKNESS = 0.035
+"""How far the top stands off the skin; dm."""
+_EARS = 0.35
+"""How much blood shows in the ears."""
 
 _SMILE_ROUNDS = 12
 """Rounds of smoothing that take the sharp folds out of smiling cheeks."""
 
 
-def skin(face: FaceModel, palette: Palette) -> Surface:
-    """Return head, neck and shoulders, subdivided once, with the hair's and the shirt's thickness added."""
+def skin(face: FaceModel) -> tuple[Surface, Surface]:
+    """Return head, neck and shoulders, subdivided once, with the thickness of hair and top; a strip behind is apart."""
+    palette, look = face.identity.palette, face.identity.look
     matrix, quads = catmull_clark(face.quads, len(face.vertices))
     matrix = _firm(matrix, np.maximum(face.masks["lips"], face.masks["eyelids"]))
     vertices, template = matrix @ face.vertices, matrix @ face.template
@@ -35,26 +41,31 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
     vertices = _close_mouth(face, vertices, quads, morphs, masks)
     carry_brows(face, template, morphs)
     angle, height = wrap(template)
-    hair = _step(above_hairline(angle, height), 0.0, 0.35) * (1 - _step(ears, 0.0, 0.3))
-    # The sheet of hair hides the scalp, but for the parting and a margin along the hairline.
-    covered = (hair > 0.9) & (np.abs(template[:, 0]) > 0.25) & (template[:, 1] > 7.3)
-    hidden = covered | _behind_eyes(face, vertices)
-    shirt = _step(below_neckline(angle, height), -0.01, 0.05)
+    inside = above_hairline(look.hair.hairline, angle, height)
+    hair = step(inside, 0.0, look.hair.ramp) * (1 - step(ears, 0.0, 0.3))
+    top = step(below_neckline(look.neckline, angle, height), 0.0, 0.25)
 
     shade = 0.28 + 0.72 * np.clip(openness(vertices, quads) / 0.92, 0, 1) ** 1.1
     shade *= 1 - 0.75 * mouth
-    thickness = _HAIR_THICKNESS * hair + _SHIRT_THICKNESS * shirt
-    vertices = vertices + vertex_normals(vertices, quads) * thickness[:, None]
+    normals = vertex_normals(vertices, quads)
+    layer = hair_layer(look.hair, template, hair) + _TOP_THICKNESS * top
+    hidden: NDArray[np.bool_] = hidden_scalp(look.hair, template, inside) | _behind_eyes(face, vertices)
+    vertices = vertices + normals * layer[:, None]
 
     colour = np.broadcast_to(np.array(palette.skin), vertices.shape)
-    cover = _step(ears, 0.1, 0.6)
+    cover = step(ears, 0.1, 0.6)
+    own = np.array(palette.skin) + _EARS * (np.array(palette.flush) - palette.skin)
     upper, lower = (_lid_line(face, vertices, row) for row in (2, 1))
-    paints = ((lips, palette.lips, 0.85), (mouth, _MOUTH, 1.0), (lower, _LOWER_LID, 0.45), (upper, _UPPER_LID, 0.9))
+    paints = (
+        *((ears, own, 1.0), (lips, palette.lips, 0.85), (mouth, _MOUTH, 1.0)),
+        *((lower, _LOWER_LID * palette.skin, 0.45), (upper, _UPPER_LID, 0.9)),
+    )
     for mask, paint, strength in paints:
         colour = colour + (np.asarray(paint) - colour) * (mask > 0.02)[:, None]
-        cover = np.maximum(cover, strength * _step(mask, 0.1, 0.9))
-    gloss = np.stack([0.075 + 0.15 * lips - 0.075 * shirt + 0.10 * hair, 12.0 + 16.0 * lips + 10 * hair], axis=1)
-    return Surface(
+        cover = np.maximum(cover, strength * step(mask, 0.1, 0.9))
+    matt = np.maximum(top, step(inside, -0.03, 0.03) * (1.0 if look.hair.strands == "curls" else 0.35))
+    gloss = np.stack([(0.075 + 0.10 * lips) * (1 - matt), 12.0 + 16.0 * lips + 10 * hair], axis=1)
+    whole = Surface(
         name="skin",
         vertices=vertices,
         quads=quads,
@@ -65,8 +76,23 @@ def skin(face: FaceModel, palette: Palette) -> Surface:
         shade=shade,
         gloss=gloss,
         follow=_follow(face, vertices),
-        drawn=~hidden[quads].all(axis=1),
+        drawn=np.logical_not(hidden[quads].all(axis=1)),
     )
+    return _open_behind(whole, template)
+
+
+def _open_behind(whole: Surface, template: Floats) -> tuple[Surface, Surface]:
+    """Detach the quads to the right of the middle of the nape, where the painting's left and right border meet.
+
+    Whole quads of the control mesh are detached, since the others may be drawn as such.
+    """
+    behind = (np.abs(template[:, 0]) < MIDDLE) & (wrap(template)[0] > 0.5 * np.pi)
+    right = template[whole.quads, 0].mean(axis=1) < 0
+    touching = (behind[whole.quads].any(axis=1) & right).reshape(-1, 4).any(axis=1)
+    rest, strip = detach(whole, "nape", np.repeat(touching, 4))
+    rows = np.unique(whole.quads[np.repeat(touching, 4)])
+    uv = np.where(behind[rows, None], mirrored(strip.uv), strip.uv)
+    return rest, replace(strip, uv=uv)
 
 
 def _close_mouth(
@@ -82,7 +108,7 @@ def _close_mouth(
 
     jaw_drop = -morphs[number["jawOpen"], :, 1]
     vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
-    leftward = _step(vertices[:, 0], -0.1, 0.1)[:, None]
+    leftward = step(vertices[:, 0], -0.1, 0.1)[:, None]
     for name in CLOSED:
         left, right = (morphs[number[name + side]] for side in ("Left", "Right"))
         seal = sealing(vertices + left + right, quads, lips, jaw_drop)
@@ -98,7 +124,7 @@ def _firm(matrix: sparse.csr_array, places: Floats) -> sparse.csr_array:
     """
     n = matrix.shape[1]
     drawn_in = sparse.eye_array(n) - matrix[:n]
-    return sparse.csr_array(matrix @ (sparse.eye_array(n) + sparse.diags_array(_step(places, 0.0, 0.5)) @ drawn_in))
+    return sparse.csr_array(matrix @ (sparse.eye_array(n) + sparse.diags_array(step(places, 0.0, 0.5)) @ drawn_in))
 
 
 def _lid_line(face: FaceModel, vertices: Floats, row: int) -> Floats:
@@ -109,7 +135,7 @@ def _lid_line(face: FaceModel, vertices: Floats, row: int) -> Floats:
         roots = lashes[np.linalg.norm(lashes - centre, axis=1) < 1.22 * face.eye_radius]
         near = np.flatnonzero(np.linalg.norm(vertices - centre, axis=1) < 2 * face.eye_radius)
         distance = np.linalg.norm(vertices[near, None] - roots, axis=2).min(axis=1)
-        line[near] = np.maximum(line[near], 1 - _step(distance, 0.006, 0.020))
+        line[near] = np.maximum(line[near], 1 - step(distance, 0.006, 0.020))
     return line
 
 
@@ -125,14 +151,9 @@ def _follow(face: FaceModel, vertices: Floats) -> Floats:
     """Weigh the neck's share by height above its root, the skull's share by distance above the jaw's underside."""
     neck, skull, jaw = (face.pivots[name] for name in ("neck", "head", "jaw"))
     root, top = neck[1] - 0.05, skull[1] - 0.25
-    bend = _step(vertices[:, 1], root - 0.15, top)
+    bend = step(vertices[:, 1], root - 0.15, top)
     # The border between skull and neck runs from below the chin obliquely up to the nape.
     chin_floor = jaw[1] - 0.16
     border = chin_floor + (skull[1] - 0.05 - chin_floor) * np.clip((0.75 - vertices[:, 2]) / 0.85, 0, 1)
-    turn = _step(vertices[:, 1] - border, -0.42, 0.10)
+    turn = step(vertices[:, 1] - border, -0.42, 0.10)
     return np.stack([bend, turn], axis=1)
-
-
-def _step(x: Floats, low: float, high: float) -> Floats:
-    t: Floats = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3 - 2 * t)

@@ -1,6 +1,6 @@
 """Surfaces: the pieces that a picture of the face is made of."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,3 +77,35 @@ def loose_surface(
         follow=np.ones((n, 2)),
         drawn=np.ones(len(quads), dtype=bool),
     )
+
+
+def detach(surface: Surface, name: str, quads: NDArray[np.bool_]) -> tuple[Surface, Surface]:
+    """Take some quads out of a surface as a piece of their own, whose texture coordinates may then jump at its edge.
+
+    Parameters
+    ----------
+    surface : Surface
+        The whole surface.
+    name : str
+        What the piece is called.
+    quads : (Q,) bool
+        The quads of the piece.
+
+    Returns
+    -------
+    rest : Surface
+        The same surface, which no longer draws those quads.
+    piece : Surface
+        The quads with copies of their vertices, in the order of the whole surface.
+    """
+    rows, own = np.unique(surface.quads[quads], return_inverse=True)
+    by_vertex = ("vertices", "uv", "colour", "cover", "shade", "gloss", "follow")
+    piece = replace(
+        surface,
+        **{attribute: getattr(surface, attribute)[rows] for attribute in by_vertex},
+        name=name,
+        morphs=surface.morphs[:, rows],
+        quads=own.reshape(-1, 4).astype(np.int64),
+        drawn=surface.drawn[quads],
+    )
+    return replace(surface, drawn=surface.drawn & ~quads), piece
