@@ -1,6 +1,6 @@
 """Eyes: painted balls with pupils that can grow, and lashes."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,12 +83,12 @@ class _Fringe:
 # to somebody; thin ones would break into dots.
 _FRINGES = {
     "female": (
-        _Fringe(lid="upper", count=28, length=0.52, width=1.15, lift=0.30, levels=3, softness=(0.0, 0.35)),
-        _Fringe(lid="lower", count=20, length=0.24, width=1.0, lift=-0.10, levels=2, softness=(0.55, 0.85)),
+        _Fringe(lid="upper", count=28, length=0.44, width=1.2, lift=0.25, levels=3, softness=(0.0, 0.55)),
+        _Fringe(lid="lower", count=20, length=0.20, width=1.2, lift=-0.10, levels=2, softness=(0.68, 0.92)),
     ),
     "male": (
-        _Fringe(lid="upper", count=26, length=0.32, width=1.1, lift=0.10, levels=2, softness=(0.15, 0.55)),
-        _Fringe(lid="lower", count=18, length=0.18, width=1.0, lift=-0.05, levels=2, softness=(0.65, 0.90)),
+        _Fringe(lid="upper", count=26, length=0.30, width=1.2, lift=0.10, levels=2, softness=(0.20, 0.70)),
+        _Fringe(lid="lower", count=18, length=0.16, width=1.2, lift=-0.05, levels=2, softness=(0.75, 0.95)),
     ),
 }
 
@@ -121,7 +121,7 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
         ball = loose_surface(
             name, points + centre, quads, still, _ball_colour(angle, turn, palette), gloss=(0, 1), shade=shade
         )
-        balls.append(Surface(**{**vars(ball), "gloss": gloss}))
+        balls.append(replace(ball, gloss=gloss))
     return balls
 
 
@@ -200,7 +200,8 @@ def _outer_lids(face: FaceModel, centre: Floats) -> NDArray[np.int64]:
     a, b, c, d = (face.vertices[face.quads[front, k]] for k in range(4))
     outwards = np.einsum("ij,ij->i", np.cross(c - a, d - b), middle[front]) > 0
     # The lining of the socket behind the ball's front looks outwards, too, but lies inside the ball.
-    return face.quads[front][outwards & (close[front] > 1.0)]
+    lids: NDArray[np.int64] = face.quads[front][outwards & (close[front] > 1.0)]
+    return lids
 
 
 def _samples(corners: Floats) -> Floats:
@@ -208,7 +209,8 @@ def _samples(corners: Floats) -> Floats:
     steps = np.linspace(0.0, 1.0, 4)
     across, down = (grid.ravel() for grid in np.meshgrid(steps, steps))
     weights = np.stack([(1 - across) * (1 - down), across * (1 - down), across * down, (1 - across) * down], axis=1)
-    return np.einsum("sk,qkx->qsx", weights, corners).reshape(-1, 3)
+    places: Floats = np.einsum("sk,qkx->qsx", weights, corners).reshape(-1, 3)
+    return places
 
 
 def _ball_colour(angle: Floats, turn: Floats, palette: Palette) -> Floats:
@@ -306,7 +308,8 @@ def _spike_quads(n_lashes: int, n_vertices: int) -> NDArray[np.int64]:
     last = 3 * (rings - 1) + np.arange(3)
     tip = np.stack([last, np.full(3, n_vertices - 1), np.full(3, n_vertices - 1), np.roll(last, -1)], axis=1)
     one = np.concatenate([sides, tip])
-    return (np.arange(n_lashes)[:, None, None] * n_vertices + one).reshape(-1, 4)
+    quads: NDArray[np.int64] = (np.arange(n_lashes)[:, None, None] * n_vertices + one).reshape(-1, 4)
+    return quads
 
 
 def _between(row: NDArray[np.floating], at: Floats) -> Floats:
@@ -317,7 +320,8 @@ def _between(row: NDArray[np.floating], at: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    lengths: Floats = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / lengths
 
 
 def grid_quads(n_rows: int, n_columns: int, *, closed: bool = True) -> NDArray[np.int64]:
