@@ -70,10 +70,12 @@ class Rig:
         ).astype(np.float32)
         self.control = ControlPoints(face, surfaces)
         self._rest = rest
-        self._quads = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts[:-1], strict=True)])
+        faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts[:-1], strict=True)])
+        self._corners = np.ascontiguousarray(faces.T)
         # One sequential sparse product: the same result on each run, and most morphs move few vertices.
         self._morphs = sparse.csr_array(morphs.reshape(len(morphs), -1).T.astype(np.float64))
-        self._around = sparse.csr_array(sparse.block_diag([piece.around for piece in pieces]))
+        around = sparse.block_diag([piece.around for piece in pieces])
+        self._around = sparse.csr_array(around).astype(np.float32)
         follow = np.concatenate([surface.follow for surface in surfaces])
         self._pupil_growth = pupil_growth(face)
         self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
@@ -87,14 +89,17 @@ class Rig:
             span, centre = self.spans[name], self.face.eye_centres[eye]
             turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
             ball = self._rest[span] - centre + (motion.pupils[frame, eye] - 1.0) * self._pupil_growth
-            positions[span] = ball @ turn.T + centre + (0, 0, motion.thrust[frame, eye])
+            positions[span] = _times(ball, turn) + centre + (0, 0, motion.thrust[frame, eye])
         positions = self._turns.apply(positions, motion.head[frame])
         return positions, self._normals(positions)
 
     def _normals(self, positions: Floats) -> Floats:
         """Average the faces' area-weighted normals at each vertex."""
-        a, b, c, d = (positions[self._quads[:, k]] for k in range(4))
-        normals: Floats = self._around @ _cross(c - a, d - b)
+        # Half the precision is plenty for shading, and coordinate by coordinate there is less to move.
+        corners = [np.take(column, self._corners) for column in positions.T.astype(np.float32)]
+        (ux, uy, uz), (vx, vy, vz) = ([place[k + 2] - place[k] for place in corners] for k in (0, 1))
+        across = np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+        normals = np.asarray(self._around @ across, dtype=np.float64)
         lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
         normals /= np.maximum(lengths, 1e-12)[:, None]
         return normals
@@ -105,21 +110,32 @@ class _Turns:
 
     def __init__(self, follow: Floats, neck: Floats, skull: Floats) -> None:
         self._neck, self._skull = neck, skull
-        self._follow = follow
-        self._moving = np.flatnonzero((follow > 0).any(axis=1))
+        rigid = (follow == 1).all(axis=1)
+        still = (follow == 0).all(axis=1)
+        self._still, self._bending = np.flatnonzero(still), np.flatnonzero(~rigid & ~still)
+        self._share = follow[self._bending]
 
     def apply(self, positions: Floats, head: Floats) -> Floats:
+        """Return the positions (N, 3) after a rotation of the head by pitch, yaw and roll (3,)."""
         if not head.any():
             return positions
         pitch, yaw, roll = head
         turn = Rotation.from_euler("YXZ", [yaw, pitch, roll]).as_rotvec()
-        moved = positions[self._moving]
-        follow = self._follow[self._moving]
-        moved = _rotate(moved, self._skull, (1 - NECK_SHARE) * turn, follow[:, 1])
-        moved = _rotate(moved, self._neck, NECK_SHARE * turn, follow[:, 0])
-        result = positions.copy()
-        result[self._moving] = moved
+        on_skull, on_neck = (1 - NECK_SHARE) * turn, NECK_SHARE * turn
+        # Most of the head follows both fully: one rotation, and one shift.
+        first, second = (Rotation.from_rotvec(part).as_matrix() for part in (on_skull, on_neck))
+        shift = second @ (self._skull - first @ self._skull - self._neck) + self._neck
+        result: Floats = _times(positions, second @ first) + shift
+        bent = _rotate(positions[self._bending], self._skull, on_skull, self._share[:, 1])
+        result[self._bending] = _rotate(bent, self._neck, on_neck, self._share[:, 0])
+        result[self._still] = positions[self._still]
         return result
+
+
+def _times(points: Floats, matrix: Floats) -> Floats:
+    """Multiply each row by a matrix (3, 3). BLAS would start threads for it, which takes longer."""
+    x, y, z = points.T
+    return np.stack([x * row[0] + y * row[1] + z * row[2] for row in matrix], axis=1)
 
 
 def _rotate(points: Floats, pivot: Floats, turn: Floats, share: Floats) -> Floats:
@@ -128,9 +144,10 @@ def _rotate(points: Floats, pivot: Floats, turn: Floats, share: Floats) -> Float
     axis = turn / angle
     arm = points - pivot
     across = _cross(np.broadcast_to(axis, arm.shape), arm)
-    along = (arm @ axis)[:, None] * axis
+    along = np.einsum("ij,j->i", arm, axis)[:, None] * axis
     cosine, sine = np.cos(share * angle)[:, None], np.sin(share * angle)[:, None]
-    return pivot + along + cosine * (arm - along) + sine * across
+    turned: Floats = pivot + along + cosine * (arm - along) + sine * across
+    return turned
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
