@@ -73,7 +73,7 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
     """
     rng = np.random.default_rng(_SEED)
     centre = _centre(face)
-    elevation = np.concatenate([np.linspace(0.85, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
+    elevation = np.concatenate([np.linspace(0.62, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
     fall = np.concatenate([np.zeros(_HEAD_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])[:, None]
     share = np.linspace(0, 1, _COLUMNS)
     left = np.interp(elevation, [0.0, 0.2, 0.5], [0.90, 0.87, 0.80]) - 0.05 * fall
@@ -84,7 +84,7 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
 
     high = np.broadcast_to(elevation, angle.shape)
     swell = 0.045 * step(from_edge, 0.0, 0.45)
-    gap = swell - (swell + 0.04) * step(high, 0.15, 0.85)
+    gap = swell - (swell + 0.07) * step(high, 0.10, 0.62)
     locks = gaussian_filter(rng.standard_normal(_COLUMNS), 0.6) * 0.014 * step(-high, -0.5, 0.0)
     # Below the ears the hair hangs, first a little fuller, then turning in at the hem.
     inner = np.clip(from_edge / 0.5, 0, 1)
@@ -93,13 +93,15 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
 
     # Longest beside the chin, and uneven as hair is.
     hem = float(face.pivots["jaw"][1]) - 0.16 + 0.24 * np.clip(from_edge / 2.2, 0, 1)
-    hem = hem + 0.010 * rng.standard_normal(_COLUMNS)
+    hem = hem + 0.09 * (1 - step(from_edge, 0.0, 0.22)) + 0.008 * rng.standard_normal(_COLUMNS)
     y = centre[1] + np.sin(high) * reach - fall * (centre[1] - hem)
     level = np.cos(high) * reach
     vertices = np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1)
 
     along = np.linspace(0, 1, len(elevation))[:, None] * np.ones_like(share)
-    shade = (0.66 + 0.34 * np.clip(from_edge / 0.25, 0, 1)) * (1.0 - 0.35 * fall**2)
+    # Darker towards the front edge, but not where it comes out of the layer.
+    shade = 1.0 - 0.34 * (1 - step(from_edge, 0.0, 0.25)) * (1 - step(high, 0.0, 0.35))
+    shade = shade * (1.0 - 0.35 * fall**2)
     uv = place_strand(np.tile(share, len(elevation)), along.ravel())
     # What hangs on the shoulders lags behind the head.
     follow = np.stack([np.ones_like(shade), np.broadcast_to(1.0 - 0.22 * fall, shade.shape)], axis=-1)
@@ -123,7 +125,7 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
 def _bun(face: FaceModel, skin: Surface) -> Surface:
     """Build a bun behind the crown: a flattened ball whose strands wind round it."""
     centre = _centre(face)
-    elevation = np.full(1, 0.80)
+    elevation = np.full(1, 0.66)
     reach = float(_Reach(skin, centre)(np.full(1, np.pi), elevation)[0])
     axis = np.array([0.0, np.sin(elevation[0]), -np.cos(elevation[0])])
     up = np.array([0.0, np.cos(elevation[0]), np.sin(elevation[0])])
@@ -152,7 +154,7 @@ def _hair_surface(
     uv: Floats,
     shade: Floats,
     follow: Floats,
-    gloss: tuple[float, float] = (0.065, 16.0),
+    gloss: tuple[float, float] = (0.049, 22.0),
     inwards: bool = False,
 ) -> Surface:
     """Make a surface of a grid (rows, columns, 3) of vertices that shows the painted strands."""

@@ -60,13 +60,22 @@ class Hairstyle:
 
 
 BOB = Hairstyle(
-    _SOFT_LINE, top=0.15, sides=0.09, ramp=0.40, rough=0.0, strands="aside", soft=0.12, parting=0.30, loose="bob"
+    hairline=_SOFT_LINE,
+    top=0.15,
+    sides=0.11,
+    ramp=0.40,
+    rough=0.0,
+    strands="aside",
+    soft=0.12,
+    ragged=0.012,
+    parting=0.30,
+    loose="bob",
 )
 DRAWN_BACK = Hairstyle(_SOFT_LINE, top=0.15, sides=0.07, ramp=0.40, rough=0.004, strands="back", soft=0.12, loose="bun")
 SIDE_PARTED = Hairstyle(
-    _CUT_LINE, top=0.21, sides=0.045, ramp=0.18, rough=0.008, strands="aside", soft=0.09, ragged=0.04, parting=0.42
+    _CUT_LINE, top=0.20, sides=0.045, ramp=0.38, rough=0.008, strands="aside", soft=0.09, ragged=0.018, parting=0.42
 )
-SHORT_CUT = Hairstyle(_CUT_LINE, top=0.16, sides=0.040, ramp=0.24, rough=0.010, strands="down", soft=0.09, ragged=0.09)
+SHORT_CUT = Hairstyle(_CUT_LINE, top=0.16, sides=0.040, ramp=0.24, rough=0.010, strands="down", soft=0.08, ragged=0.07)
 CLOSE_CROP = Hairstyle(_CUT_LINE, top=0.035, sides=0.012, ramp=0.20, rough=0.0, strands="curls", soft=0.07)
 AFRO = Hairstyle(_SOFT_LINE, top=0.17, sides=0.15, ramp=0.30, rough=0.005, strands="curls", soft=0.08)
 

@@ -19,6 +19,8 @@ WIDTH, HEIGHT = 1024, 1024
 _COARSE = 4
 """The distance to the hairline is smooth: it is found for one pixel of so many across and down."""
 _SEED = 20130607
+_SWEEP = 0.5
+"""How far parted hair is combed backwards, rad; 0 is straight to the sides."""
 _EVERYWHERE = 8.45
 """Height in dm above which the painting shows nothing but hair; loose hair borrows it."""
 
@@ -55,11 +57,11 @@ class _Painter:
         flush += 0.30 * self._spot((0.0, 6.88), (0.11, 0.10))
         flush += 0.22 * self._spot((0.15, 6.82), (0.06, 0.07))
         flush += 0.14 * self._spot((0.0, 6.30), (0.20, 0.10))
-        flush += 0.10 * self._spot((0.0, 7.75), (0.40, 0.12))
+        flush += 0.05 * self._spot((0.0, 7.75), (0.40, 0.12))
         # Under the jaw the painting is drawn out, and a pattern would show as streaks.
         even = step(self._up, 6.0, 6.3)
         flush += (0.07 * noise.bumps(40, 50) + 0.05 * noise.bumps(150, 150)) * even
-        shadow = 0.34 * self._spot((0.33, 7.375), (0.17, 0.045))
+        shadow = 0.28 * self._spot((0.33, 7.375), (0.17, 0.045))
         shadow += 0.22 * self._spot((0.17, 7.27), (0.05, 0.10))
         shadow += 0.13 * self._spot((0.30, 7.12), (0.16, 0.05))
         shadow += 0.10 * self._spot((0.0, 6.44), (0.16, 0.03))
@@ -76,11 +78,11 @@ class _Painter:
         rows = _rows(6.0, 7.2)
         angle, height = self._aside[rows], self._up[rows]
         cheek = 6.46 + 0.62 * step(angle, 0.45, 1.05)
-        area = step(cheek - height, -0.10, 0.12) * step(height, 6.12, 6.26) * (1 - step(angle, 1.10, 1.30))
+        area = step(cheek - height, -0.10, 0.12) * step(height, 6.16, 6.34) * (1 - step(angle, 1.10, 1.30))
         lip = step(height, 6.60, 6.66) * (1 - step(height, 6.74, 6.82)) * (1 - step(angle, 0.20, 0.34))
         corner = self._spot((0.34, 6.58), (0.09, 0.12))[rows]
         stubble = 1.0 + 0.30 * self._noise.bumps(500, 500)[rows]
-        cover = 0.45 * self._look.beard * np.maximum(np.maximum(area, 0.9 * lip), 0.7 * corner) * stubble
+        cover = 0.45 * self._look.beard * np.maximum(np.maximum(area, 0.65 * lip), 0.45 * corner) * stubble
         shadow = 0.75 * np.array(self._palette.brows) + 0.20 * np.array(self._palette.skin)
         base[rows] = _mix(base[rows], shadow, cover)
         return base
@@ -115,14 +117,14 @@ class _Painter:
             tufts = noise.bumps(420, 330)
         else:
             across, along = self._flow()
-            strands = 0.75 * noise.at(across * 120, along * 2) + 0.35 * noise.at(across * 34, along)
+            strands = 0.75 * noise.at(across * 240, along * 2) + 0.45 * noise.at(across * 70, along)
             tufts = 0.6 * noise.bumps(560, 20) + 0.6 * noise.bumps(150, 12)
         if style.loose is not None:
             hanging = 0.7 * noise.bumps(420, 3) + 0.5 * noise.bumps(130, 3)
             strands = np.where(self._height > _EVERYWHERE, hanging, strands)
         # Single strands catch the light, on black hair as on fair hair.
         hair = np.multiply(self._palette.hair, (1.0 + 0.24 * strands)[..., None])
-        hair += 0.05 * np.maximum(strands, 0.0)[..., None]
+        hair += 0.06 * np.maximum(strands, 0.0)[..., None]
         if style.parting is not None:
             # The scalp shows through, less and less towards the crown.
             off = (self._angle - style.parting) * np.cos(np.clip(self._height - 7.4, 0, 1.5))
@@ -142,18 +144,19 @@ class _Painter:
         x, z = 0.75 * level * np.sin(angle), 0.95 * level * np.cos(angle)
         if self._look.hair.strands == "back":
             # Round the place behind the crown where it is tied.
-            return np.arctan2(x, height - 6.6), z
+            return 0.6 * np.arctan2(x, height - 6.6), z
         if self._look.hair.strands == "aside":
-            # Round an axis from ear to ear, which bends the strands down and a little forward.
-            return np.arctan2(z + 0.15 * np.abs(x), height - 5.6), x
-        return angle, height
+            # Away from the parting and backwards, then down.
+            side = np.where(angle < (self._look.hair.parting or 0.0), 1.0, -1.0)
+            return np.arctan2(np.cos(_SWEEP) * z - np.sin(_SWEEP) * side * x, height - 5.6), side * x
+        return 0.5 * angle, height
 
     def top(self, base: Floats) -> Floats:
         """Lay the top over the shoulders, with a ribbed band along its edge and its shadow on the skin."""
         noise, band = self._noise, self._look.neckline.band
         # The lowest row stands for all below it, where a pattern would be drawn out to streaks.
         fading = step(self._height, LOWEST + 0.05, LOWEST + 0.3)
-        weave = (0.025 * noise.bumps(700, 500) + 0.03 * noise.bumps(30, 24)) * fading
+        weave = (0.025 * noise.bumps(700, 500) + 0.015 * noise.bumps(30, 24)) * fading
         under = below_neckline(self._look.neckline, self._angle, self._height)
         ribs = 0.03 * np.sin(self._angle * 130.0) * step(under, 0.0, 0.01) * (1 - step(under, band - 0.01, band))
         seam = 0.12 * np.exp(-(((under - band) / 0.012) ** 2))
