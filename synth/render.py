@@ -87,8 +87,8 @@ class Renderer:
         self.width, self.height = width, height
         self._rig = rig
         self._closed = False
-        with _current() as graphics:
-            at, field_of_view = _camera(rig.face, width, height)
+        with current_graphics() as graphics:
+            at, field_of_view = camera(rig.face, width, height)
             self._canvas = Canvas(
                 *(graphics.gl, graphics.pyrender, rig),
                 camera_at=at,
@@ -169,18 +169,18 @@ class Renderer:
     @contextmanager
     def _open(self) -> Iterator[Canvas]:
         """Lend the canvas to this thread alone."""
-        with _current():
+        with current_graphics():
             if self._closed:
                 raise RenderError("The renderer is closed; make a new one.")
             yield self._canvas
 
 
 def _delete(canvas: Canvas) -> None:
-    with _current():
+    with current_graphics():
         canvas.delete()
 
 
-def _camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:
+def camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:
     """Frame head and shoulders as in a video call; return the camera's position and its vertical field of view."""
     eye_line = float(face.eye_centres[:, 1].mean())
     head_height = float(face.pivots["head-2"][1] - face.pivots["jaw"][1])
@@ -194,7 +194,7 @@ _lock = threading.RLock()
 
 
 @contextmanager
-def _current() -> Iterator["_Graphics"]:
+def current_graphics() -> Iterator["_Graphics"]:
     """Make the process's graphics context current in this thread, and let it go afterwards."""
     with _lock:
         graphics = _graphics()
