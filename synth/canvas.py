@@ -175,12 +175,16 @@ class Canvas:
         rows = np.flatnonzero(self._beside @ (pose != self._shown).any(axis=1))
         if not len(rows):
             return _NOTHING
-        points = np.concatenate([self._shown[rows, :3], pose[rows, :3]])
-        x, y, _, w = self._camera[:, :3] @ points.T + self._camera[:, 3:]
-        places = 0.5 * (np.stack([x / w, y / w], axis=1) + 1) * self._size
-        low = np.clip(np.floor(places.min(axis=0)) - _MARGIN, 0, self._size).astype(int).tolist()
-        high = np.clip(np.ceil(places.max(axis=0)) + _MARGIN, 0, self._size).astype(int).tolist()
-        return (*low, *high) if low[0] < high[0] and low[1] < high[1] else _NOTHING
+        columns = [np.concatenate([self._shown[rows, k], pose[rows, k]]) for k in range(3)]
+        x, y, w = (
+            row[0] * columns[0] + row[1] * columns[1] + row[2] * columns[2] + row[3] for row in self._camera[[0, 1, 3]]
+        )
+        box = []
+        for places, size in ((x / w, self._size[0]), (y / w, self._size[1])):
+            ends = 0.5 * size * (np.array([places.min(), places.max()]) + 1)
+            box.append(np.clip([np.floor(ends[0]) - _MARGIN, np.ceil(ends[1]) + _MARGIN], 0, size).astype(int).tolist())
+        (left, right), (low, high) = box
+        return (left, low, right, high) if left < right and low < high else _NOTHING
 
 
 def _scene(gl: Any, pyrender: Any, rig: Rig, triangles: NDArray[np.uint32]) -> Any:

@@ -6,8 +6,7 @@ import pytest
 from click.testing import CliRunner
 
 from synth.fap.table import column
-from webapp.cli import bench
-from webapp.cli.main import cli
+from webapp.cli import bench, main
 
 STAGES = ("solve", "upload", "draw", "readback", "encode")
 
@@ -17,7 +16,7 @@ def figures(monkeypatch: pytest.MonkeyPatch, face_dir: Path) -> dict[str, float]
     monkeypatch.setenv("PADLAB_FACE_DIR", str(face_dir))
     for name, value in {"REPEATS": 1, "SECONDS": 1, "MEMORY_SECONDS": (1, 2), "WIDTH": 160, "HEIGHT": 128}.items():
         monkeypatch.setattr(bench, name, value)
-    done = CliRunner().invoke(cli, ["bench", "render", "--json"], catch_exceptions=False)
+    done = CliRunner().invoke(main, ["bench", "render", "--json"], catch_exceptions=False)
     assert done.exit_code == 0
     return json.loads(done.output)
 
