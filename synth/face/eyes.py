@@ -24,7 +24,7 @@ _RINGS = np.concatenate(
     [
         [PUPIL - _SOFT, PUPIL + _SOFT],
         np.radians([14.0, 18.5, 22.5, 25.6, 28.2]),
-        np.radians([36.0, 47.0, 62.0, 80.0, 100.0, 122.0]),
+        np.radians([36.0, 47.0, 62.0, 82.0, 106.0, 136.0]),
     ]
 )
 """Angles of the ball's rings of vertices from its pole, the middle of the pupil."""
