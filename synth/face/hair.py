@@ -73,7 +73,7 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
     """
     rng = np.random.default_rng(_SEED)
     centre = _centre(face)
-    elevation = np.concatenate([np.linspace(0.62, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
+    elevation = np.concatenate([np.linspace(0.95, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
     fall = np.concatenate([np.zeros(_HEAD_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])[:, None]
     share = np.linspace(0, 1, _COLUMNS)
     left = np.interp(elevation, [0.0, 0.2, 0.5], [0.90, 0.87, 0.80]) - 0.05 * fall
@@ -84,23 +84,24 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
 
     high = np.broadcast_to(elevation, angle.shape)
     swell = 0.045 * step(from_edge, 0.0, 0.45)
-    gap = swell - (swell + 0.07) * step(high, 0.10, 0.62)
-    locks = gaussian_filter(rng.standard_normal(_COLUMNS), 0.6) * 0.014 * step(-high, -0.5, 0.0)
+    gap = swell - (swell + 0.035) * step(high, 0.25, 0.95)
+    # Locks of different fullness; they also come out of the layer at different heights.
+    locks = gaussian_filter(rng.standard_normal(_COLUMNS), 0.6) * (0.014 + 0.010 * step(high, 0.1, 0.5))
     # Below the ears the hair hangs, first a little fuller, then turning in at the hem.
     inner = np.clip(from_edge / 0.5, 0, 1)
     curl = 0.06 * np.sin(np.pi * np.clip(fall * 1.1, 0, 1)) - (0.05 + 0.11 * inner) * fall**3
     reach = _Reach(skin, centre)(angle, high) + gap + curl + locks
 
     # Longest beside the chin, and uneven as hair is.
-    hem = float(face.pivots["jaw"][1]) - 0.16 + 0.24 * np.clip(from_edge / 2.2, 0, 1)
-    hem = hem + 0.09 * (1 - step(from_edge, 0.0, 0.22)) + 0.008 * rng.standard_normal(_COLUMNS)
+    hem = float(face.pivots["jaw"][1]) - 0.19 + 0.24 * np.clip(from_edge / 2.2, 0, 1)
+    hem = hem + 0.17 * (1 - step(from_edge, 0.0, 0.32)) + 0.010 * inner * rng.standard_normal(_COLUMNS)
     y = centre[1] + np.sin(high) * reach - fall * (centre[1] - hem)
     level = np.cos(high) * reach
     vertices = np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1)
 
     along = np.linspace(0, 1, len(elevation))[:, None] * np.ones_like(share)
     # Darker towards the front edge, but not where it comes out of the layer.
-    shade = 1.0 - 0.34 * (1 - step(from_edge, 0.0, 0.25)) * (1 - step(high, 0.0, 0.35))
+    shade = 1.0 - 0.34 * (1 - step(from_edge, 0.0, 0.25)) * (1 - step(high, 0.0, 0.45))
     shade = shade * (1.0 - 0.35 * fall**2)
     uv = place_strand(np.tile(share, len(elevation)), along.ravel())
     # What hangs on the shoulders lags behind the head.
@@ -212,7 +213,9 @@ class _Reach:
         away, near = self._scalp.query(direction, k=4)
         weight = 1.0 / (away**2 + 1e-4)
         scalp = (weight * self._distance[near]).sum(axis=-1) / weight.sum(axis=-1)
-        reach: Floats = ears + (scalp - ears) * step(elevation, 0.0, 0.6)
+        # Over the ears the way out is long and smooth; at the temples the hair stays close.
+        aside = np.abs((angle + np.pi) % (2 * np.pi) - np.pi)
+        reach: Floats = ears + (scalp - ears) * step(elevation / (0.4 + 0.5 * step(aside, 0.9, 1.4)), 0.0, 1.0)
         return reach
 
     @staticmethod

@@ -9,7 +9,7 @@ from scipy.ndimage import zoom
 from synth.face.look import Look
 from synth.face.noise import Noise
 from synth.face.palette import Palette
-from synth.face.wrapping import HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step, wrap
+from synth.face.wrapping import CROWN, HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step, wrap
 
 __all__ = ["HEIGHT", "WIDTH", "paint", "wrap"]
 
@@ -21,8 +21,6 @@ _COARSE = 4
 _SEED = 20130607
 _SWEEP = 0.5
 """How far parted hair is combed backwards, rad; 0 is straight to the sides."""
-_EVERYWHERE = 8.45
-"""Height in dm above which the painting shows nothing but hair; loose hair borrows it."""
 
 
 @functools.cache
@@ -121,7 +119,7 @@ class _Painter:
             tufts = 0.6 * noise.bumps(560, 20) + 0.6 * noise.bumps(150, 12)
         if style.loose is not None:
             hanging = 0.7 * noise.bumps(420, 3) + 0.5 * noise.bumps(130, 3)
-            strands = np.where(self._height > _EVERYWHERE, hanging, strands)
+            strands = np.where(self._height > CROWN, hanging, strands)
         # Single strands catch the light, on black hair as on fair hair.
         hair = np.multiply(self._palette.hair, (1.0 + 0.24 * strands)[..., None])
         hair += 0.06 * np.maximum(strands, 0.0)[..., None]

@@ -17,9 +17,10 @@ _HEAD_AXIS, _NECK_AXIS = 0.4, 0.15
 """Depth in dm of the vertical axis that the painting is wrapped round, in the head and in the neck."""
 _DOME_HEIGHT, _DOME_RADIUS = 7.4, 1.1
 """Above this height, in dm, places count by elevation: a dome would squeeze the crown into a few rows."""
-LOWEST, HIGHEST = 4.35, 9.15
-_ALL_HAIR = (8.45, 8.85)
-"""Heights in dm between which the painting shows hair at each angle."""
+LOWEST, HIGHEST = 4.35, 9.50
+CROWN = 9.17
+"""Height in dm just above the crown; over it the painting shows loose hair at each angle."""
+_LOOSE_HAIR = (CROWN + 0.02, HIGHEST - 0.02)
 _CHEST_SLOPE, _SHOULDER_SLOPE = 0.75, 1.3
 """Below the jaw the lines of equal height lie round the neck as the edge of a top does: lower on the chest than on the
 nape, and lower the further they are from the neck. A cone and a plane show no waves on large triangles."""
@@ -89,7 +90,7 @@ def canvas(width: int, height: int) -> tuple[Floats, Floats]:
 
 def place_strand(across: Floats, along: Floats) -> Floats:
     """Return texture coordinates (N, 2) within the painted hair: across the strands 0 to 1, along them 0 to 1."""
-    lowest, highest = ((height - LOWEST) / (HIGHEST - LOWEST) for height in _ALL_HAIR)
+    lowest, highest = ((height - LOWEST) / (HIGHEST - LOWEST) for height in _LOOSE_HAIR)
     return np.column_stack([across, highest + (lowest - highest) * along])
 
 
