@@ -70,5 +70,5 @@ def test_eyes_are_where_the_lids_are(face: FaceModel) -> None:
 
 
 def test_unknown_identity_is_refused_with_the_known_ones(face_dir: Path) -> None:
-    with pytest.raises(AssetError, match=r"nobody.*default"):
+    with pytest.raises(AssetError, match=r"nobody.*mei"):
         load_face(face_dir, "nobody")
