@@ -56,7 +56,7 @@ class Canvas:
         self._gl = gl
         self._size = width, height
         # What shows the painting comes first, so that each of the two programs draws one run of triangles.
-        painted = (rig.paint[:, 3] > 0)[rig.triangles].any(axis=1)
+        painted = rig.paint[rig.triangles, 3].max(axis=1) > 0
         scene = _scene(gl, pyrender, rig, np.concatenate([rig.triangles[painted], rig.triangles[~painted]]))
         pose = np.eye(4)
         pose[:3, 3] = camera_at
@@ -69,7 +69,7 @@ class Canvas:
         self._surface._update_context(scene, pyrender.RenderFlags.OFFSCREEN)
         view, projection = self._surface._get_camera_matrices(scene)
         self._camera = (projection @ view).astype(np.float32)
-        count = int(painted.sum())
+        count = int(np.count_nonzero(painted))
         self._runs = (
             (self._program("painted"), 0, 3 * count),
             (self._program("plain"), 3 * count * np.dtype(np.uint32).itemsize, 3 * (len(painted) - count)),

@@ -3,6 +3,7 @@
 import contextlib
 import secrets
 import subprocess
+import wave
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -18,10 +19,11 @@ _MAX_RATE = 240
 
 
 class VideoWriter:
-    """Write frames to an MP4 file (H.264, yuv420p, ready to stream); a context manager.
+    """Write frames to an MP4 file (H.264, yuv420p, ready to stream), with AAC sound if wanted; a context manager.
 
-    Equal frames give equal bytes. The file appears under its name only when it is complete: leaving the ``with`` block
-    by an exception, or a failure of ffmpeg, leaves nothing behind and an older file of that name untouched.
+    Equal frames and equal sound give equal bytes. The file appears under its name only when it is complete: leaving the
+    ``with`` block by an exception, or a failure of ffmpeg, leaves nothing behind and an older file of that name
+    untouched.
 
     Parameters
     ----------
@@ -31,21 +33,27 @@ class VideoWriter:
         Size of the frames in pixels; both even, as the format demands.
     fps : float
         Frames per second.
+    audio : Path, optional
+        A PCM WAV file that begins with the first frame. The film lasts as long as its frames: sound that is shorter is
+        followed by silence, sound that is longer is cut.
 
     Raises
     ------
     SpecError
         If the size or the rate is impossible.
     VideoError
-        If ffmpeg cannot be started.
+        If ffmpeg cannot be started, or the sound cannot be read.
     """
 
-    def __init__(self, path: Path, width: int, height: int, *, fps: float = 25) -> None:
+    def __init__(self, path: Path, width: int, height: int, *, fps: float = 25, audio: Path | None = None) -> None:
         if width < 2 or height < 2 or width % 2 or height % 2:
             raise SpecError(f"A video of {width} x {height} pixels is impossible: width and height must be even.")
         if not 0 < fps <= _MAX_RATE:
             raise SpecError(f"A video cannot have {fps} frames per second; give a number above 0, at most {_MAX_RATE}.")
+        if audio is not None:
+            _check_sound(audio)
         self.path, self.width, self.height = path, width, height
+        self._fps, self._audio = fps, audio
         self._count = 0
         self._partial = _partial_name(path)
         self._done = False
@@ -93,6 +101,8 @@ class VideoWriter:
                 raise VideoError(f"The video {self.path} has no frames; write at least one.")
             if not self._finish():
                 raise VideoError(self._failure())
+            if self._audio is not None:
+                self._add_sound(self._audio)
             try:
                 self._partial.replace(self.path)
             except OSError as error:
@@ -119,6 +129,23 @@ class VideoWriter:
         except OSError:
             return False
         return self._ffmpeg.wait() == 0
+
+    def _add_sound(self, audio: Path) -> None:
+        """Put the sound beside the finished pictures, whose duration is known only now."""
+        silent = _partial_name(self.path)
+        self._partial.replace(silent)
+        try:
+            done = subprocess.run(  # noqa: S603 - a fixed program, no shell
+                _sound_command(silent, audio, self._partial, self._count / self._fps),
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                check=False,
+            )
+        finally:
+            silent.unlink(missing_ok=True)
+        if done.returncode:
+            said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+            raise VideoError(f"ffmpeg could not add the sound {audio} ({said[-1] if said else 'it gave no reason'}).")
 
     def _failure(self) -> str:
         """End ffmpeg and say in one sentence what it complained about."""
@@ -169,6 +196,19 @@ def _check(frame: NDArray[Any], shape: tuple[int, int, int] | None) -> None:
         raise SpecError(f"A frame of {frame.shape} {frame.dtype} was given; it must be {wanted} uint8.")
 
 
+def _check_sound(audio: Path) -> None:
+    try:
+        with wave.open(str(audio), "rb") as sound:
+            samples = sound.getnframes()
+    except OSError as error:
+        raise VideoError(f"The sound {audio} could not be read: {error.strerror or error}.") from error
+    except (wave.Error, EOFError) as error:
+        reason = str(error) or "it ends too early"
+        raise VideoError(f"The sound {audio} is not a WAV file with PCM samples ({reason}).") from error
+    if not samples:
+        raise VideoError(f"The sound {audio} holds no samples; leave it out for a silent film.")
+
+
 def _partial_name(path: Path) -> Path:
     return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
@@ -178,9 +218,26 @@ def _command(path: Path, width: int, height: int, fps: float) -> list[str]:
     return [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "pipe:0"),
-        *("-an", "-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=accurate_rnd+bitexact"),
+        *("-an", "-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=bitexact"),
         *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "18", "-threads", "1"),
         *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
+        *_container(path),
+    ]
+
+
+def _sound_command(silent: Path, audio: Path, path: Path, seconds: float) -> list[str]:
+    """Compose the call that copies the pictures and encodes the sound, padded or cut to their duration."""
+    return [
+        *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
+        *("-i", f"file:{silent}", "-i", f"file:{audio}", "-map", "0:v", "-map", "1:a"),
+        *("-c:v", "copy", "-af", f"apad,atrim=duration={seconds:.6f}", "-c:a", "aac", "-b:a", "128k"),
+        *("-flags:a", "+bitexact", "-threads", "1"),
+        *_container(path),
+    ]
+
+
+def _container(path: Path) -> list[str]:
+    return [
         *("-map_metadata", "-1", "-fflags", "+bitexact", "-flags:v", "+bitexact"),
         *("-movflags", "+faststart", "-f", "mp4", f"file:{path}"),
     ]

@@ -1,5 +1,9 @@
+import re
+import subprocess
+import wave
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import imageio.v3 as iio
 import imageio_ffmpeg
@@ -16,7 +20,7 @@ def moving_bar(k: int, *, width: int = 114, height: int = 90) -> np.ndarray:
     return frame
 
 
-def write(path: Path, n_frames: int = 12, **options: float) -> Path:
+def write(path: Path, n_frames: int = 12, **options: Any) -> Path:
     with VideoWriter(path, 114, 90, **options) as video:
         for k in range(n_frames):
             video.write(moving_bar(k))
@@ -31,11 +35,16 @@ def test_frames_and_size_come_back(tmp_path: Path) -> None:
         assert np.abs(frames[k].astype(int) - moving_bar(k)).mean() < 4
 
 
-def test_colours_survive(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "colour",
+    [(225, 182, 158), (92, 56, 42), (39, 29, 25), (76, 102, 128), (204, 208, 212), (188, 101, 96), (250, 250, 250)],
+)
+def test_colours_survive(tmp_path: Path, colour: tuple[int, int, int]) -> None:
+    """Skin, hair, clothes, backdrop, lips and teeth."""
     with VideoWriter(tmp_path / "a.mp4", 64, 64) as video:
         for _ in range(5):
-            video.write(np.full((64, 64, 3), (225, 182, 158), dtype=np.uint8))
-    assert np.abs(iio.imread(tmp_path / "a.mp4")[2].astype(int) - (225, 182, 158)).max() <= 3
+            video.write(np.full((64, 64, 3), colour, dtype=np.uint8))
+    assert np.abs(iio.imread(tmp_path / "a.mp4")[2].astype(int) - colour).max() <= 3
 
 
 def test_rate_and_format(tmp_path: Path) -> None:
@@ -44,6 +53,96 @@ def test_rate_and_format(tmp_path: Path) -> None:
     assert found["fps"] == 30
     assert found["codec"] == "h264"
     assert found["pix_fmt"].startswith("yuv420p")
+
+
+def beep(path: Path, seconds: float, *, rate: int = 22050, at: float = 0.0) -> Path:
+    """A WAV file: silence, and from ``at`` on a tone of 440 Hz."""
+    time = np.arange(round(seconds * rate)) / rate
+    samples = (0.5 * 32767 * np.sin(2 * np.pi * 440 * time) * (time >= at)).astype("<i2")
+    with wave.open(str(path), "wb") as sound:
+        sound.setnchannels(1)
+        sound.setsampwidth(2)
+        sound.setframerate(rate)
+        sound.writeframes(samples.tobytes())
+    return path
+
+
+def heard(path: Path, rate: int = 22050) -> np.ndarray:
+    """The film's sound, decoded to one channel of floats."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(path), "-f", "f32le", "-ac", "1"]
+    decoded = subprocess.run([*command, "-ar", str(rate), "-"], capture_output=True, check=True)
+    return np.frombuffer(decoded.stdout, "<f4")
+
+
+def loudness(samples: np.ndarray) -> float:
+    return float(np.sqrt((samples**2).mean()))
+
+
+def test_sound_starts_when_it_should(tmp_path: Path) -> None:
+    sound = heard(write(tmp_path / "a.mp4", 50, audio=beep(tmp_path / "a.wav", 2.0, at=1.2)))
+    assert len(sound) / 22050 == pytest.approx(2.0, abs=0.05)
+    loud = np.flatnonzero(np.abs(sound) > 0.1)
+    assert loud[0] / 22050 == pytest.approx(1.2, abs=0.01)
+    assert loudness(sound[-4000:-1000]) == pytest.approx(0.5 / np.sqrt(2), rel=0.1)
+
+
+def test_sound_has_its_own_rate_and_codec(tmp_path: Path) -> None:
+    film = write(tmp_path / "a.mp4", 25, audio=beep(tmp_path / "a.wav", 1.0, rate=16000))
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(film)]
+    said = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert re.search(r"Audio: aac.*16000 Hz, mono", said.stderr)
+    assert re.search(r"Video: h264", said.stderr)
+
+
+@pytest.mark.parametrize("seconds", [0.3, 3.0])
+def test_film_lasts_as_long_as_its_frames(tmp_path: Path, seconds: float) -> None:
+    film = write(tmp_path / "a.mp4", 25, audio=beep(tmp_path / "a.wav", seconds))
+    sound = heard(film)
+    assert len(sound) / 22050 == pytest.approx(1.0, abs=0.05)
+    assert loudness(sound[1000:5000]) > 0.3
+    assert (loudness(sound[-8000:]) < 0.01) == (seconds < 1)
+    assert len(iio.imread(film)) == 25
+
+
+def test_equal_sound_gives_equal_bytes(tmp_path: Path) -> None:
+    sound = beep(tmp_path / "a.wav", 0.5)
+    first, second = write(tmp_path / "a.mp4", audio=sound), write(tmp_path / "b.mp4", audio=sound)
+    assert first.read_bytes() == second.read_bytes()
+    content = first.read_bytes()
+    assert 0 < content.index(b"moov") < content.index(b"mdat")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["a.mp4", "a.wav", "b.mp4"]
+
+
+def test_pictures_are_the_same_with_and_without_sound(tmp_path: Path) -> None:
+    loud = write(tmp_path / "a.mp4", audio=beep(tmp_path / "a.wav", 0.5))
+    assert (iio.imread(loud) == iio.imread(write(tmp_path / "b.mp4"))).all()
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"), [(None, "No such file"), (b"", "not a WAV file"), (b"RIFF\0\0", "not a WAV file")]
+)
+def test_unreadable_sound_is_refused_at_once(tmp_path: Path, content: bytes | None, reason: str) -> None:
+    sound = tmp_path / "a.wav"
+    if content is not None:
+        sound.write_bytes(content)
+    with pytest.raises(VideoError, match=reason) as error:
+        VideoWriter(tmp_path / "a.mp4", 114, 90, audio=sound)
+    assert str(sound) in str(error.value)
+    assert "\n" not in str(error.value)
+    assert not list(tmp_path.glob("*.mp4*"))
+
+
+def test_sound_without_samples_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(VideoError, match="no samples"):
+        VideoWriter(tmp_path / "a.mp4", 114, 90, audio=beep(tmp_path / "a.wav", 0.0))
+
+
+def test_sound_that_vanishes_is_told(tmp_path: Path) -> None:
+    sound = beep(tmp_path / "a.wav", 0.5)
+    with pytest.raises(VideoError, match=r"a\.wav"), VideoWriter(tmp_path / "a.mp4", 114, 90, audio=sound) as video:
+        video.write(moving_bar(0))
+        sound.unlink()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_index_lies_before_the_pictures(tmp_path: Path) -> None:
