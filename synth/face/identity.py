@@ -156,7 +156,7 @@ _ALL = (
         look=Look(
             hair=SIDE_PARTED,
             brows=Brows(thickness=1.15, raised=-0.005, arch=0.03),
-            neckline=Neckline(height=5.56, drop=0.22, width=0.7, pointed=True),
+            neckline=Neckline(height=5.62, drop=0.16, width=0.45, pointed=True),
             beard=0.6,
         ),
     ),
@@ -205,7 +205,7 @@ _ALL = (
         palette=Palette(
             skin=(0.460, 0.308, 0.235),
             flush=(0.450, 0.245, 0.185),
-            lips=(0.430, 0.240, 0.200),
+            lips=(0.425, 0.212, 0.185),
             hair=(0.085, 0.070, 0.065),
             brows=(0.145, 0.086, 0.062),
             shirt=(0.760, 0.760, 0.740),

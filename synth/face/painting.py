@@ -111,8 +111,8 @@ class _Painter:
         half = zoom(coarse, _COARSE, order=1, grid_mode=True, mode="nearest")
         inside = np.concatenate([half, half[:, ::-1]], axis=1)
         if style.strands == "curls":
-            strands = 0.9 * noise.bumps(210, 165) + 0.8 * noise.bumps(420, 330)
-            tufts = noise.bumps(420, 330)
+            strands = 0.9 * noise.bumps(210, 260) + 0.8 * noise.bumps(420, 520)
+            tufts = noise.bumps(420, 440)
         else:
             across, along = self._flow()
             strands = 0.75 * noise.at(across * 240, along * 2) + 0.45 * noise.at(across * 70, along)
@@ -154,7 +154,7 @@ class _Painter:
         noise, band = self._noise, self._look.neckline.band
         # The lowest row stands for all below it, where a pattern would be drawn out to streaks.
         fading = step(self._height, LOWEST + 0.05, LOWEST + 0.3)
-        weave = (0.025 * noise.bumps(700, 500) + 0.015 * noise.bumps(30, 24)) * fading
+        weave = (0.025 * noise.bumps(700, 500) + 0.008 * noise.bumps(30, 24)) * fading
         under = below_neckline(self._look.neckline, self._angle, self._height)
         ribs = 0.03 * np.sin(self._angle * 130.0) * step(under, 0.0, 0.01) * (1 - step(under, band - 0.01, band))
         seam = 0.12 * np.exp(-(((under - band) / 0.012) ** 2))

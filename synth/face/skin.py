@@ -64,7 +64,11 @@ def skin(face: FaceModel) -> tuple[Surface, Surface]:
         colour = colour + (np.asarray(paint) - colour) * (mask > 0.02)[:, None]
         cover = np.maximum(cover, strength * step(mask, 0.1, 0.9))
     matt = np.maximum(top, step(inside, -0.03, 0.03) * (1.0 if look.hair.strands == "curls" else 0.35))
-    gloss = np.stack([(0.075 + 0.10 * lips) * (1 - matt), 12.0 + 16.0 * lips + 10 * hair], axis=1)
+    # The broad sheen of light skin would lie like fog on dark skin, whose form shows in narrower highlights.
+    light = float(np.square(palette.skin) @ (0.21, 0.72, 0.07))
+    sheen = 0.052 + 0.040 * light + (0.05 + 0.09 * light) * lips
+    narrow = 28.0 - 28.0 * light + (8.0 + 14.0 * light) * lips + 10 * hair
+    gloss = np.stack([sheen * (1 - matt), narrow], axis=1)
     whole = Surface(
         name="skin",
         vertices=vertices,

@@ -39,7 +39,7 @@ def test_hair_leaves_the_face_free(figure: Rig) -> None:
     (left, eyes, _), (right, *_) = face.eye_centres
     hair = strands(figure)
     in_front = hair[hair[:, 2] > face.eye_centres[0, 2] - 0.3]
-    before = (in_front[:, 0] < left + 2.2 * face.eye_radius) & (in_front[:, 0] > right - 2.2 * face.eye_radius)
+    before = (in_front[:, 0] < left + 1.6 * face.eye_radius) & (in_front[:, 0] > right - 1.6 * face.eye_radius)
     assert not (before & (in_front[:, 1] < eyes + 0.6)).any()
 
 
