@@ -4,7 +4,7 @@ import hashlib
 import json
 import re
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
@@ -211,6 +211,7 @@ def render_faps(
     identity: str = DEFAULT_IDENTITY,
     width: int = 720,
     height: int = 576,
+    on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Render FAP values to an MP4 file, frame after frame: a long film takes no more memory than a short one.
 
@@ -226,6 +227,8 @@ def render_faps(
         Frames per second.
     identity, width, height
         As in `ClipSpec`.
+    on_progress : callable, optional
+        Called with the number of finished frames and of all.
 
     Returns
     -------
@@ -241,7 +244,7 @@ def render_faps(
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     sequence = check_sequence(values)
-    frames = Stage(face_dir, identity).film(sequence, out, fps=fps, width=width, height=height)
+    frames = Stage(face_dir, identity).film(sequence, out, fps=fps, width=width, height=height, on_progress=on_progress)
     faps = hashlib.sha256(np.ascontiguousarray(sequence, dtype="<f8").tobytes()).hexdigest()
     return {
         "identity": identity,

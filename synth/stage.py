@@ -1,6 +1,6 @@
 """The stage: figures and renderers that are kept for the next film, for dressing a figure takes a while."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from pathlib import Path
 
@@ -69,7 +69,16 @@ class Stage:
         if len(values):
             yield from renderer.frames(self.move(values))
 
-    def film(self, values: NDArray[np.floating] | Floats, out: Path, *, fps: int, width: int, height: int) -> int:
+    def film(
+        self,
+        values: NDArray[np.floating] | Floats,
+        out: Path,
+        *,
+        fps: int,
+        width: int,
+        height: int,
+        on_progress: Callable[[int, int], None] | None = None,
+    ) -> int:
         """Write FAP values (T, 68) as an MP4 file, frame after frame, and return T.
 
         Raises
@@ -79,12 +88,13 @@ class Stage:
         RenderError, VideoError
             If OpenGL does not start, or the file cannot be written.
         """
-        frames = 0
+        tell = on_progress or (lambda _finished, _all: None)
         with VideoWriter(out, width, height, fps=fps) as video:
-            for picture in self.pictures(values, width=width, height=height):
+            tell(0, len(values))
+            for count, picture in enumerate(self.pictures(values, width=width, height=height), start=1):
                 video.write(picture)
-                frames += 1
-        return frames
+                tell(count, len(values))
+        return len(values)
 
 
 @lru_cache(maxsize=2)

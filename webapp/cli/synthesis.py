@@ -6,69 +6,41 @@ from pathlib import Path
 
 import click
 
-from synth.clip import ClipSpec, render_clip, render_still
+from synth.clip import ClipSpec, clip_faps, render_clip, render_still
 from synth.expression.pad_pep import MODEL_NAMES
-from synth.face import assets
-from synth.face.identity import DEFAULT_IDENTITY
+from synth.face.identity import find_identity
+from synth.files import write_whole
 from synth.pad import PAD
+from webapp.cli.animation import write_animation
 from webapp.cli.context import NEGATIVE_NUMBERS
-from webapp.config import Settings
-from webapp.errors import ConfigError
+from webapp.cli.options import FILE, check_out, face_dir, identity_option, size_option
 
-SIZE = re.compile(r"(\d{2,4})[x×](\d{2,4})")
 CJK = re.compile(r"[\u3400-\u9fff]")
-
-
-class SizeType(click.ParamType[tuple[int, int]]):
-    """A picture's size, WIDTHxHEIGHT in pixels."""
-
-    name = "WxH"
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        """Read the size."""
-        match = SIZE.fullmatch(str(value))
-        if match is None:
-            self.fail(f"'{value}' is no size; it takes WIDTHxHEIGHT in pixels, for instance 720x576", param, ctx)
-        return int(match[1]), int(match[2])
-
-
-def _face_dir() -> Path:
-    folder = Settings.from_env().face_dir
-    if not assets.is_compiled(folder):
-        click.echo("Fetching the face data (48 MB, once)", err=True)
-        assets.fetch(folder)
-    return folder
-
-
-def _check_out(out: Path, suffix: str, *, option: str = "--out") -> None:
-    if out.suffix.lower() != suffix:
-        raise click.BadParameter(f"'{out}' must end with {suffix}", param_hint=option)
-    if not out.resolve().parent.is_dir():
-        raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with {option}")
 
 
 @click.command(context_settings=NEGATIVE_NUMBERS)
 @click.argument("p", type=float)
 @click.argument("a", type=float)
 @click.argument("d", type=float)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The picture (PNG).")
+@click.option("--out", type=FILE, required=True, help="The picture (PNG).")
 @click.option(
     "--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression."
 )
-@click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
-@click.option("--size", type=SizeType(), default="720x576", show_default=True)
+@identity_option
+@size_option
 def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
     """Draw the face of the emotion P A D (pleasure, arousal, dominance, each from -1 to 1)."""
-    _check_out(out, ".png")
+    check_out(out, ".png")
     # Checked before the face data is fetched: a wrong number should not cost a download.
     pad = PAD.parse((p, a, d)).as_tuple()
-    render_still(pad, out, _face_dir(), model=model, identity=identity, width=size[0], height=size[1])
+    find_identity(identity)
+    render_still(pad, out, face_dir(), model=model, identity=identity, width=size[0], height=size[1])
     click.echo(f"Written: {out}")
 
 
 @click.command(context_settings=NEGATIVE_NUMBERS)
 @click.argument("text")
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The clip (MP4).")
+@click.option("--out", type=FILE, required=True, help="The clip (MP4).")
 @click.option("--lang", type=click.Choice(["en", "zh"]), help="Language [default: Chinese if it has Chinese letters].")
 @click.option("--pad", nargs=3, type=float, default=(0.55, 0.24, 0.28), show_default=True, help="The emotion P A D.")
 @click.option(
@@ -80,10 +52,13 @@ def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, 
     help="From PAD to expression; neutral shows none.",
 )
 @click.option("--mute", is_flag=True, help="Without sound (clips are silent for now, so this changes nothing yet).")
-@click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
-@click.option("--size", type=SizeType(), default="720x576", show_default=True)
+@identity_option
+@size_option
 @click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True, help="Seed of the blinks.")
-@click.option("--lineage", type=click.Path(path_type=Path, dir_okay=False), help="Write how it was made (JSON).")
+@click.option("--fap", type=FILE, help="Write the clip's FAP values (FAP file).")
+@click.option("--arkit", type=FILE, help="Write its animation as ARKit weights (JSON or CSV).")
+@click.option("--gltf", type=FILE, help="Write figure and animation (GLB).")
+@click.option("--lineage", type=FILE, help="Write how it was made (JSON).")
 def say(
     *,
     text: str,
@@ -95,12 +70,19 @@ def say(
     identity: str,
     size: tuple[int, int],
     seed: int,
+    fap: Path | None,
+    arkit: Path | None,
+    gltf: Path | None,
     lineage: Path | None,
 ) -> None:
     """Make a clip that is as long as TEXT takes to say, with the expression of the emotion --pad."""
-    _check_out(out, ".mp4")
-    if lineage is not None:
-        _check_out(lineage, ".json", option="--lineage")
+    check_out(out, ".mp4")
+    check_out(fap, ".fap", option="--fap")
+    check_out(arkit, ".json", ".csv", option="--arkit")
+    check_out(gltf, ".glb", option="--gltf")
+    check_out(lineage, ".json", option="--lineage")
+    if arkit is not None and lineage is not None and arkit.resolve() == lineage.resolve():
+        raise click.BadParameter(f"'{arkit}' is the file of --lineage, too; name another", param_hint="--arkit")
     neutral = face_model == "neutral"
     spec = ClipSpec(
         text=text,
@@ -112,7 +94,11 @@ def say(
         height=size[1],
         seed=seed,
     )
-    made = render_clip(spec, out, _face_dir())
-    if lineage is not None:
-        lineage.write_text(json.dumps(made, ensure_ascii=False, indent=1), encoding="utf-8")
+    folder = face_dir()
+    made = render_clip(spec, out, folder)
     click.echo(f"Written: {out}")
+    files = [path for path in (fap, arkit, gltf) if path is not None]
+    write_animation(clip_faps(spec), files, folder, fps=spec.fps, identity=identity)
+    if lineage is not None:
+        write_whole(lineage, json.dumps(made, ensure_ascii=False, indent=1))
+        click.echo(f"Written: {lineage}")

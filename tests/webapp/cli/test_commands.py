@@ -7,35 +7,15 @@ from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 
 from webapp.cli import main
 from webapp.cli.main import COMMANDS
 
 
 @pytest.fixture
-def run(environment: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> object:
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-
-    def invoke(*arguments: str, stdin: str = "") -> Result:
-        return CliRunner().invoke(main, arguments, input=stdin)
-
-    return invoke
-
-
-@pytest.fixture
-def in_empty_folder(database: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def _fails(result: Result, *parts: str) -> None:
-    assert result.exit_code == 1, result.output
-    assert result.stderr.startswith("Error: ")
-    assert result.stderr.count("\n") == 1
-    assert "Traceback" not in result.stderr
-    for part in parts:
-        assert part in result.stderr
+def in_empty_folder(database: object, folder: Path) -> None:
+    """A current folder with an empty database."""
 
 
 def _all_commands() -> list[tuple[str, ...]]:
@@ -49,13 +29,23 @@ def _all_commands() -> list[tuple[str, ...]]:
     return found
 
 
+def _options(command: tuple[str, ...]) -> list[str]:
+    context = click.Context(main)
+    found = main.get_command(context, command[0])
+    for name in command[1:]:
+        found = found.get_command(context, name)
+    return [param.opts[-1] for param in found.params if isinstance(param, click.Option)]
+
+
 @pytest.mark.parametrize("command", _all_commands(), ids=" ".join)
 def test_every_command_has_help_and_is_documented(command: tuple[str, ...], pytestconfig: pytest.Config) -> None:
     result = CliRunner().invoke(main, [*command, "--help"])
     assert result.exit_code == 0
     assert len(result.output.splitlines()) > 4
     documentation = (pytestconfig.rootpath / "docs" / "cli.md").read_text(encoding="utf-8")
-    assert f"padlab {' '.join(command)}" in documentation
+    (line,) = [line for line in documentation.splitlines() if line.startswith(f"| `padlab {' '.join(command)}`")]
+    for option in _options(command):
+        assert re.search(rf"{option}\b", line), f"{option} is not documented"
 
 
 def test_a_face_is_a_picture(run: object, tmp_path: Path) -> None:
@@ -98,6 +88,7 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
         (("face", "0", "0", "0", "--out", "nowhere/x.png"), ("does not exist", "--out")),
         (("face", "0", "0", "0", "--out", "x.png", "--identity", "nobody"), ("nobody", "mei")),
         (("say", "Hi", "--out", "x.mp4", "--lineage", "nowhere/x.json"), ("does not exist", "--lineage")),
+        (("say", "Hi", "--out", "x.mp4", "--identity", "nobody"), ("nobody", "mei")),
         (("study", "show", "nosuch"), ("nosuch",)),
         (("report", "nosuch"), ("nosuch",)),
         (("export", "nosuch"), ("nosuch",)),
@@ -106,9 +97,9 @@ def test_a_sentence_is_a_clip_with_its_lineage(run: object, tmp_path: Path) -> N
     ],
 )
 def test_wrong_input_gives_one_sentence(
-    run: object, in_empty_folder: None, arguments: tuple[str, ...], parts: tuple[str, ...]
+    run: object, fails: object, in_empty_folder: None, arguments: tuple[str, ...], parts: tuple[str, ...]
 ) -> None:
-    _fails(run(*arguments), *parts)
+    fails(run(*arguments), *parts)
 
 
 @pytest.mark.parametrize(
@@ -119,6 +110,10 @@ def test_wrong_input_gives_one_sentence(
         ("face", "0", "0", "0", "--out", "x.jpg"),
         ("say", "Hello", "--out", "x.mp4", "--size", "large"),
         ("say", "Hello", "--out", "x.mp4", "--lineage", "x.mp4"),
+        ("say", "Hello", "--out", "x.mp4", "--fap", "x.txt"),
+        ("say", "Hello", "--out", "x.mp4", "--arkit", "x.glb"),
+        ("say", "Hello", "--out", "x.mp4", "--gltf", "x.gltf"),
+        ("say", "Hello", "--out", "x.mp4", "--arkit", "x.json", "--lineage", "./x.json"),
         ("nosuch",),
         ("serve", "--port", "0"),
         ("export", "demo", "--format", "nosuch"),
@@ -130,44 +125,46 @@ def test_wrong_usage_is_exit_code_2(run: object, arguments: tuple[str, ...]) -> 
     assert "Traceback" not in result.stderr
 
 
-def test_commands_on_an_empty_database_say_what_to_run(run: object) -> None:
-    _fails(run("study", "list"), "padlab db upgrade")
+def test_commands_on_an_empty_database_say_what_to_run(run: object, fails: object) -> None:
+    fails(run("study", "list"), "padlab db upgrade")
     assert run("db", "current").output.startswith("empty")
     assert run("db", "upgrade").exit_code == 0
     assert "(newest)" in run("db", "current").output
 
 
-def test_a_corrupt_database_gives_one_sentence(run: object, tmp_path: Path) -> None:
+def test_a_corrupt_database_gives_one_sentence(run: object, fails: object, tmp_path: Path) -> None:
     (tmp_path / "padlab.sqlite").write_text("no database at all " * 100)
     for arguments in (("study", "list"), ("db", "upgrade"), ("demo", "--no-serve"), ("serve",)):
-        _fails(run(*arguments), "not a database", "PADLAB_HOME")
+        fails(run(*arguments), "not a database", "PADLAB_HOME")
 
 
-def test_a_malformed_study_file_names_file_and_line(run: object, tmp_path: Path, database: object) -> None:
+def test_a_malformed_study_file_names_file_and_line(
+    run: object, fails: object, tmp_path: Path, database: object
+) -> None:
     path = tmp_path / "broken.yaml"
     path.write_text("slug: demo\ntitle: {en: A\n", encoding="utf-8")
     for command in ("validate", "apply"):
-        _fails(run("study", command, str(path)), "broken.yaml", "line")
+        fails(run("study", command, str(path)), "broken.yaml", "line")
 
 
 def test_a_clip_that_synthesis_cannot_make_is_found_before_anything_is_stored(
-    run: object, tmp_path: Path, database: object, pytestconfig: pytest.Config
+    run: object, fails: object, tmp_path: Path, database: object, pytestconfig: pytest.Config
 ) -> None:
     source = (pytestconfig.rootpath / "tests" / "data" / "mini.yaml").read_text(encoding="utf-8")
     path = tmp_path / "far.yaml"
     path.write_text(source.replace("[-0.40, 0.22, 0.12]", "[-4.0, 0.22, 0.12]"), encoding="utf-8")
     for command in ("validate", "apply"):
-        _fails(run("study", command, str(path)), "far.yaml, line 16", "stimuli[1].clip", "-4")
+        fails(run("study", command, str(path)), "far.yaml, line 16", "stimuli[1].clip", "-4")
     assert json.loads(run("study", "list", "--json").output) == []
 
 
 def test_a_fault_of_a_condition_is_found_at_the_condition(
-    run: object, tmp_path: Path, pytestconfig: pytest.Config
+    run: object, fails: object, tmp_path: Path, pytestconfig: pytest.Config
 ) -> None:
     source = (pytestconfig.rootpath / "tests" / "data" / "mini.yaml").read_text(encoding="utf-8")
     path = tmp_path / "who.yaml"
     path.write_text(source.replace("{intensity: 0.4}", "{intensity: 0.4, identity: nobody}"), encoding="utf-8")
-    _fails(run("study", "validate", str(path)), "who.yaml, line 12", "conditions[0].clip", "'nobody'", "mei")
+    fails(run("study", "validate", str(path)), "who.yaml, line 12", "conditions[0].clip", "'nobody'", "mei")
 
 
 def test_the_life_of_a_study(run: object, tmp_path: Path, database: object, pytestconfig: pytest.Config) -> None:
@@ -190,20 +187,22 @@ def test_the_life_of_a_study(run: object, tmp_path: Path, database: object, pyte
     assert "properties" in json.loads(run("study", "schema").output)
 
 
-def test_accounts(run: object, database: object) -> None:
+def test_accounts(run: object, fails: object, database: object) -> None:
     made = run("user", "add", "wu")
     assert re.search(r"Password \(shown only now\): \S{16,}", made.output)
     assert run("user", "add", "li", "--password-stdin", "--role", "admin", stdin="a long password\n").exit_code == 0
-    _fails(run("user", "add", "wu"), "already", "padlab user password wu")
+    fails(run("user", "add", "wu"), "already", "padlab user password wu")
     assert run("user", "password", "wu", "--password-stdin", stdin="another password\n").exit_code == 0
-    _fails(run("user", "password", "nobody"), "padlab user add nobody")
-    _fails(run("user", "add", "ma", "--password-stdin", stdin="short\n"), "at least")
+    fails(run("user", "password", "nobody"), "padlab user add nobody")
+    fails(run("user", "add", "ma", "--password-stdin", stdin="short\n"), "at least")
 
 
-def test_a_fault_of_our_own_is_told_in_one_sentence(run: object, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_our_own_is_told_in_one_sentence(
+    run: object, fails: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def explode(*_: object) -> None:
         raise RuntimeError("surprise")
 
     monkeypatch.setattr("webapp.cli.db.Database", explode)
-    _fails(run("db", "current"), "surprise", "--debug")
+    fails(run("db", "current"), "surprise", "--debug")
     assert isinstance(run("--debug", "db", "current").exception, RuntimeError)

@@ -1,0 +1,69 @@
+"""What the commands that make faces share: sizes, files to write, face data."""
+
+import re
+from pathlib import Path
+
+import click
+
+from synth.face import assets
+from synth.face.identity import DEFAULT_IDENTITY
+from webapp.config import Settings
+from webapp.errors import ConfigError
+
+_SIZE = re.compile(r"(\d{2,4})[x×](\d{2,4})")
+
+
+class SizeType(click.ParamType[tuple[int, int]]):
+    """A picture's size, WIDTHxHEIGHT in pixels."""
+
+    name = "WxH"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        """Read the size."""
+        match = _SIZE.fullmatch(str(value))
+        if match is None:
+            self.fail(f"'{value}' is no size; it takes WIDTHxHEIGHT in pixels, for instance 720x576", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+identity_option = click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
+size_option = click.option(
+    "--size", type=SizeType(), default="720x576", show_default=True, help="Size of the picture in pixels."
+)
+
+
+def check_out(out: Path | None, *suffixes: str, option: str = "--out") -> None:
+    """Refuse a file that could not be written, before any work is done for it.
+
+    Parameters
+    ----------
+    out : Path, optional
+        The file; None, an option that was not given, is fine.
+    *suffixes : str
+        How its name may end, for instance ".png".
+    option : str
+        Its option, for messages.
+
+    Raises
+    ------
+    click.BadParameter
+        If the name ends otherwise.
+    ConfigError
+        If the folder does not exist.
+    """
+    if out is None:
+        return
+    if out.suffix.lower() not in suffixes:
+        raise click.BadParameter(f"'{out}' must end with {' or '.join(suffixes)}", param_hint=option)
+    if not out.resolve().parent.is_dir():
+        raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with {option}")
+
+
+def face_dir() -> Path:
+    """Return the folder of the face data, fetched if it was missing."""
+    folder = Settings.from_env().face_dir
+    if not assets.is_compiled(folder):
+        click.echo("Fetching the face data (48 MB, once)", err=True)
+        assets.fetch(folder)
+    return folder
