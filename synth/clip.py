@@ -211,6 +211,7 @@ def render_faps(
     identity: str = DEFAULT_IDENTITY,
     width: int = 720,
     height: int = 576,
+    audio: Path | None = None,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> dict[str, Any]:
     """Render FAP values to an MP4 file, frame after frame: a long film takes no more memory than a short one.
@@ -227,13 +228,15 @@ def render_faps(
         Frames per second.
     identity, width, height
         As in `ClipSpec`.
+    audio : Path, optional
+        Sound (WAV), from the film's beginning; see `synth.video.VideoWriter`.
     on_progress : callable, optional
         Called with the number of finished frames and of all.
 
     Returns
     -------
     dict
-        The lineage as plain JSON values: a digest of the FAP values, identity, size, frames, duration, digests,
+        The lineage as plain JSON values: digests of FAP values and sound, identity, size, frames, duration, digests,
         versions.
 
     Raises
@@ -246,6 +249,7 @@ def render_faps(
     sequence = check_sequence(values)
     frames = Stage(face_dir, identity).film(sequence, out, fps=fps, width=width, height=height, on_progress=on_progress)
     faps = hashlib.sha256(np.ascontiguousarray(sequence, dtype="<f8").tobytes()).hexdigest()
+    sound = {} if audio is None else {"audio": hashlib.sha256(audio.read_bytes()).hexdigest()}
     return {
         "identity": identity,
         "width": width,
@@ -253,7 +257,13 @@ def render_faps(
         "fps": fps,
         "frames": frames,
         "duration_s": frames / fps,
-        "digests": {"faps": faps, "format": FORMAT, "assets": asset_digest(face_dir), "renderer": RENDERER_VERSION},
+        "digests": {
+            "faps": faps,
+            **sound,
+            "format": FORMAT,
+            "assets": asset_digest(face_dir),
+            "renderer": RENDERER_VERSION,
+        },
         "versions": _versions(),
     }
 

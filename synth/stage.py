@@ -77,9 +77,10 @@ class Stage:
         fps: int,
         width: int,
         height: int,
+        audio: Path | None = None,
         on_progress: Callable[[int, int], None] | None = None,
     ) -> int:
-        """Write FAP values (T, 68) as an MP4 file, frame after frame, and return T.
+        """Write FAP values (T, 68) as an MP4 file, frame after frame, with the sound of a WAV file; return T.
 
         Raises
         ------
@@ -89,7 +90,7 @@ class Stage:
             If OpenGL does not start, or the file cannot be written.
         """
         tell = on_progress or (lambda _finished, _all: None)
-        with VideoWriter(out, width, height, fps=fps) as video:
+        with VideoWriter(out, width, height, fps=fps, audio=audio) as video:
             tell(0, len(values))
             for count, picture in enumerate(self.pictures(values, width=width, height=height), start=1):
                 video.write(picture)

@@ -22,11 +22,14 @@ def fap() -> None:
 @fap.command()
 @click.argument("file", type=FILE)
 @click.option("--out", type=FILE, required=True, help="The clip (MP4).")
+@click.option("--audio", type=FILE, help="Its sound (WAV).")
 @identity_option
 @size_option
-def render(*, file: Path, out: Path, identity: str, size: tuple[int, int]) -> None:
+def render(*, file: Path, out: Path, audio: Path | None, identity: str, size: tuple[int, int]) -> None:
     """Make a clip of a FAP file, at its own frame rate."""
     check_out(out, ".mp4")
+    if audio is not None and audio.suffix.lower() != ".wav":
+        raise click.BadParameter(f"'{audio}' must end with .wav", param_hint="--audio")
     find_identity(identity)
     found = _read(file)
     with progress_bar("Rendering frames") as update:
@@ -38,6 +41,7 @@ def render(*, file: Path, out: Path, identity: str, size: tuple[int, int]) -> No
             identity=identity,
             width=size[0],
             height=size[1],
+            audio=audio,
             on_progress=update,
         )
     click.echo(f"Written: {out}")

@@ -1,6 +1,7 @@
 """FAP files in and out by commands."""
 
 import json
+import wave
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -30,6 +31,21 @@ def test_a_fap_file_becomes_a_clip_at_its_own_rate(run: object, smile: Path, tmp
     reader = imageio_ffmpeg.read_frames(out)
     found = next(reader)
     assert (found["fps"], found["size"], sum(1 for _ in reader)) == (10, (96, 80), 12)
+
+
+def test_sound_comes_along(run: object, smile: Path, tmp_path: Path) -> None:
+    sound, out = tmp_path / "hum.wav", tmp_path / "smile.mp4"
+    with wave.open(str(sound), "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(16000)
+        hum = 9000 * np.sin(np.arange(16000) / 20)
+        file.writeframes(hum.astype("<i2").tobytes())
+    options = ("--size", "64x48", "--audio", str(sound))
+    assert run("fap", "render", str(smile), "--out", str(out), *options).exit_code == 0
+    found = next(imageio_ffmpeg.read_frames(out))
+    assert found["audio_codec"] == "aac"
+    assert found["duration"] == pytest.approx(1.2, abs=0.05)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".csv", ".glb"])
@@ -99,6 +115,7 @@ def test_say_writes_all_its_files(run: object, tmp_path: Path) -> None:
         (("export", "smile.fap", "--out", "a.csv", "--identity", "nobody"), ("nobody", "mei")),
         (("render", "smile.fap", "--out", "nowhere/a.mp4"), ("does not exist", "--out")),
         (("render", "smile.fap", "--out", "a.mp4", "--size", "97x80"), ("even",)),
+        (("render", "smile.fap", "--out", "a.mp4", "--audio", "none.wav"), ("none.wav",)),
     ],
 )
 def test_wrong_input_gives_one_sentence(
@@ -114,6 +131,7 @@ def test_wrong_input_gives_one_sentence(
     [
         ("render", "smile.fap"),
         ("render", "smile.fap", "--out", "a.avi"),
+        ("render", "smile.fap", "--out", "a.mp4", "--audio", "a.mp3"),
         ("export", "smile.fap", "--out", "a.gltf"),
         ("check",),
         ("play", "smile.fap"),
