@@ -247,7 +247,9 @@ def render_faps(
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     sequence = check_sequence(values)
-    frames = Stage(face_dir, identity).film(sequence, out, fps=fps, width=width, height=height, on_progress=on_progress)
+    frames = Stage(face_dir, identity).film(
+        sequence, out, fps=fps, width=width, height=height, audio=audio, on_progress=on_progress
+    )
     faps = hashlib.sha256(np.ascontiguousarray(sequence, dtype="<f8").tobytes()).hexdigest()
     sound = {} if audio is None else {"audio": hashlib.sha256(audio.read_bytes()).hexdigest()}
     return {
