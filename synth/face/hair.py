@@ -1,5 +1,8 @@
 """Hair: a layer over the scalp, and what hangs or stands off from it: a bob, a bun."""
 
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates, maximum_filter
@@ -17,7 +20,8 @@ _COLUMNS, _HEAD_ROWS, _FALL_ROWS = 47, 9, 9
 _LINING_ROWS = _FALL_ROWS + 2
 """Rows of the bob's dark inner side; further up the scalp is close behind the bob."""
 _LINING_GAP = 0.014
-_BUN_ROWS, _BUN_COLUMNS = 11, 24
+"""How far the lining lies within the bob, dm."""
+_BUN_ROWS, _BUN_COLUMNS, _BUN_ELEVATION = 11, 24, 0.66
 _BINS, _LOWEST = 72, -0.55
 """Size of the grid of directions, and its lowest elevation in radians: below the ears."""
 _SEED = 77
@@ -65,24 +69,65 @@ def loose_hair(face: FaceModel, skin: Surface) -> list[Surface]:
     return [_bun(face, skin)] if style.loose == "bun" else []
 
 
-def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
-    """Build the hanging part of a chin-length bob, and its dark lining.
+@dataclass(frozen=True)
+class _BobGrid:
+    """The grid of a bob: rows from the temples down, columns from the left front edge round the back to the right one.
 
-    Rows run from the temples down: over the head by elevation, out of the layer on the scalp, then falling to the hem
-    by height. Columns run from the left front edge round the back to the right one.
+    Rows first go over the head by ``elevation`` (R, 1), then ``fall`` (R, 1) to the hem, 0 to 1. ``angle`` (R, C) goes
+    round the head; ``from_edge`` (R, C) is the angle to the nearer front edge.
     """
+
+    elevation: Floats
+    fall: Floats
+    angle: Floats
+    from_edge: Floats
+
+    @classmethod
+    def make(cls) -> Self:
+        elevation = np.concatenate([np.linspace(0.95, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
+        fall = np.concatenate([np.zeros(_HEAD_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])[:, None]
+        left = np.interp(elevation, [0.0, 0.2, 0.5], [0.90, 0.87, 0.80]) - 0.05 * fall
+        right = left + 0.04
+        round_back = 2 * np.pi - left - right
+        share = np.linspace(0, 1, _COLUMNS)
+        return cls(elevation, fall, left + round_back * share, np.minimum(share, 1 - share) * round_back)
+
+
+def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
+    """Build the hanging part of a chin-length bob, and its dark lining."""
+    grid = _BobGrid.make()
+    vertices = _hang(face, skin, grid)
+    share, along = np.meshgrid(np.linspace(0, 1, vertices.shape[1]), np.linspace(0, 1, len(vertices)))
+    uv = np.stack([share, along], axis=-1)
+    # Darker towards the front edge, but not where it comes out of the layer.
+    shade = 1.0 - 0.34 * (1 - step(grid.from_edge, 0.0, 0.25)) * (1 - step(grid.elevation, 0.0, 0.45))
+    shade = shade * (1.0 - 0.35 * grid.fall**2)
+    # What hangs near the shoulders lags behind the head.
+    follow = np.stack([np.ones_like(shade), np.broadcast_to(1.0 - 0.22 * grid.fall, shade.shape)], axis=-1)
+    outside = _hair_surface(face, "hair", vertices, strands=uv, shade=shade, follow=follow)
+
+    rows = slice(-_LINING_ROWS, None)
+    inwards = np.stack([-np.sin(grid.angle), np.zeros_like(grid.angle), -np.cos(grid.angle)], axis=-1)
+    lining = vertices + _LINING_GAP * inwards
+    lining[..., 1] += 2 * _LINING_GAP * grid.fall**2
+    inside = _hair_surface(
+        face,
+        "hair-lining",
+        lining[rows],
+        strands=uv[rows],
+        shade=0.3 * shade[rows],
+        follow=follow[rows],
+        gloss=(0.0, 1.0),
+        flipped=True,
+    )
+    return [outside, inside]
+
+
+def _hang(face: FaceModel, skin: Surface, grid: _BobGrid) -> Floats:
+    """Return the places (R, C, 3) of a bob's outer side: out of the layer on the scalp, over the ears, to the hem."""
     rng = np.random.default_rng(_SEED)
     centre = _centre(face)
-    elevation = np.concatenate([np.linspace(0.95, 0, _HEAD_ROWS), np.zeros(_FALL_ROWS)])[:, None]
-    fall = np.concatenate([np.zeros(_HEAD_ROWS), np.linspace(0, 1, _FALL_ROWS + 1)[1:]])[:, None]
-    share = np.linspace(0, 1, _COLUMNS)
-    left = np.interp(elevation, [0.0, 0.2, 0.5], [0.90, 0.87, 0.80]) - 0.05 * fall
-    right = left + 0.04
-    round_back = 2 * np.pi - left - right
-    angle = left + round_back * share
-    from_edge = np.minimum(share, 1 - share) * round_back
-
-    high = np.broadcast_to(elevation, angle.shape)
+    high, fall, angle, from_edge = grid.elevation, grid.fall, grid.angle, grid.from_edge
     swell = 0.045 * step(from_edge, 0.0, 0.45)
     gap = swell - (swell + 0.035) * step(high, 0.25, 0.95)
     # Locks of different fullness; they also come out of the layer at different heights.
@@ -90,61 +135,38 @@ def _bob(face: FaceModel, skin: Surface) -> list[Surface]:
     # Below the ears the hair hangs, first a little fuller, then turning in at the hem.
     inner = np.clip(from_edge / 0.5, 0, 1)
     curl = 0.06 * np.sin(np.pi * np.clip(fall * 1.1, 0, 1)) - (0.05 + 0.11 * inner) * fall**3
-    reach = _Reach(skin, centre)(angle, high) + gap + curl + locks
+    reach = _Reach(skin, centre)(angle, np.broadcast_to(high, angle.shape)) + gap + curl + locks
 
-    # Longest beside the chin, and uneven as hair is.
+    # Longest beside the chin, rounded at the front, and uneven as hair is.
     hem = float(face.pivots["jaw"][1]) - 0.19 + 0.24 * np.clip(from_edge / 2.2, 0, 1)
     hem = hem + 0.17 * (1 - step(from_edge, 0.0, 0.32)) + 0.010 * inner * rng.standard_normal(_COLUMNS)
     y = centre[1] + np.sin(high) * reach - fall * (centre[1] - hem)
     level = np.cos(high) * reach
-    vertices = np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1)
-
-    along = np.linspace(0, 1, len(elevation))[:, None] * np.ones_like(share)
-    # Darker towards the front edge, but not where it comes out of the layer.
-    shade = 1.0 - 0.34 * (1 - step(from_edge, 0.0, 0.25)) * (1 - step(high, 0.0, 0.45))
-    shade = shade * (1.0 - 0.35 * fall**2)
-    uv = place_strand(np.tile(share, len(elevation)), along.ravel())
-    # What hangs on the shoulders lags behind the head.
-    follow = np.stack([np.ones_like(shade), np.broadcast_to(1.0 - 0.22 * fall, shade.shape)], axis=-1)
-    outside = _hair_surface(face, "hair", vertices, uv=uv, shade=shade, follow=follow)
-    inwards = np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], axis=-1)
-    rows = slice(len(elevation) - _LINING_ROWS, None)
-    lining = (vertices - _LINING_GAP * inwards)[rows]
-    inside = _hair_surface(
-        face,
-        "hair-lining",
-        lining,
-        uv=uv[-lining[..., 0].size :],
-        shade=0.3 * shade[rows],
-        follow=follow[rows],
-        gloss=(0.0, 1.0),
-        inwards=True,
-    )
-    return [outside, inside]
+    return np.stack([np.sin(angle) * level, y, centre[2] + np.cos(angle) * level], axis=-1)
 
 
 def _bun(face: FaceModel, skin: Surface) -> Surface:
     """Build a bun behind the crown: a flattened ball whose strands wind round it."""
     centre = _centre(face)
-    elevation = np.full(1, 0.66)
-    reach = float(_Reach(skin, centre)(np.full(1, np.pi), elevation)[0])
-    axis = np.array([0.0, np.sin(elevation[0]), -np.cos(elevation[0])])
-    up = np.array([0.0, np.cos(elevation[0]), np.sin(elevation[0])])
-    polar = np.linspace(0.0, 0.80 * np.pi, _BUN_ROWS)[:, None]
-    turn = np.linspace(0, 2 * np.pi, _BUN_COLUMNS + 1)[None, :]
+    reach = float(_Reach(skin, centre)(np.array([np.pi]), np.array([_BUN_ELEVATION]))[0])
+    axis = np.array([0.0, np.sin(_BUN_ELEVATION), -np.cos(_BUN_ELEVATION)])
+    up, aside = np.array([0.0, -axis[2], axis[1]]), np.array([1.0, 0.0, 0.0])
+    polar = np.linspace(0.0, 0.80 * np.pi, _BUN_ROWS)[:, None, None]
+    turn = np.linspace(0, 2 * np.pi, _BUN_COLUMNS + 1)[None, :, None]
     swell = 1.0 + 0.045 * np.sin(3 * turn + 5.0 * polar) + 0.02 * np.sin(7 * turn - 3.0 * polar)
-    radius = 0.34 * np.sin(polar) * swell
-    out = (reach + 0.12 + 0.25 * np.cos(polar) * swell)[..., None]
-    vertices = (
-        centre
-        + axis * out
-        + radius[..., None] * (np.cos(turn)[..., None] * up + np.sin(turn)[..., None] * (1.0, 0.0, 0.0))
-    )
-    along = np.broadcast_to(polar / np.pi, radius.shape)
+    out = reach + 0.12 + 0.25 * np.cos(polar) * swell
+    vertices = centre + axis * out + 0.34 * np.sin(polar) * swell * (np.cos(turn) * up + np.sin(turn) * aside)
     winding = 0.5 + 0.42 * np.cos(turn + 3.5 * polar)
-    shade = 0.95 - 0.50 * step(along, 0.45, 0.80)
-    uv = place_strand(winding.ravel(), along.ravel())
-    return _hair_surface(face, "hair", vertices, uv=uv, shade=shade, follow=np.ones((*radius.shape, 2)), inwards=True)
+    along = np.broadcast_to(polar / np.pi, winding.shape)
+    return _hair_surface(
+        face,
+        "hair",
+        vertices,
+        strands=np.concatenate([winding, along], axis=-1),
+        shade=0.95 - 0.50 * step(along[..., 0], 0.45, 0.80),
+        follow=np.ones((*vertices.shape[:2], 2)),
+        flipped=True,
+    )
 
 
 def _hair_surface(
@@ -152,22 +174,26 @@ def _hair_surface(
     name: str,
     vertices: Floats,
     *,
-    uv: Floats,
+    strands: Floats,
     shade: Floats,
     follow: Floats,
     gloss: tuple[float, float] = (0.049, 22.0),
-    inwards: bool = False,
+    flipped: bool = False,
 ) -> Surface:
-    """Make a surface of a grid (rows, columns, 3) of vertices that shows the painted strands."""
+    """Make a surface of a grid (R, C, 3) of vertices.
+
+    It shows the painted strands: ``strands`` (R, C, 2) are places across and along them. The rest is as in `Surface`,
+    as grids.
+    """
     rows, columns = vertices.shape[:2]
     n = rows * columns
     quads = grid_quads(rows, columns, closed=False)
     return Surface(
         name=name,
         vertices=vertices.reshape(-1, 3),
-        quads=quads[:, ::-1] if inwards else quads,
+        quads=quads[:, ::-1] if flipped else quads,
         morphs=np.zeros((len(face.morph_names), n, 3), dtype=np.float32),
-        uv=uv,
+        uv=place_strand(*strands.reshape(-1, 2).T),
         colour=np.zeros((n, 3)),
         cover=np.zeros(n),
         shade=shade.ravel(),

@@ -130,7 +130,9 @@ class _Painter:
             hair = _mix(hair, self._palette.skin, 0.30 * line)
         # The hair shades the skin along its edge.
         shaded = base * (1.0 - 0.16 * step(inside, -0.16, 0.0))[..., None]
-        return _mix(shaded, hair, step(inside + style.ragged * tufts, -0.5 * style.soft, 0.5 * style.soft))
+        # Tufts hang over the forehead; sideburns and nape are trimmed.
+        ragged = style.ragged * (0.3 + 0.7 * step(self._height, 7.5, 7.8))
+        return _mix(shaded, hair, step(inside + ragged * tufts, -0.5 * style.soft, 0.5 * style.soft))
 
     def _flow(self) -> tuple[Floats, Floats]:
         """Return coordinates across and along the strands, in radians or dm.

@@ -1,5 +1,6 @@
 """Skin, hair and clothes: the subdivided body mesh with its paint."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from synth.face.brows import carry_brows
 from synth.face.hair import hair_layer, hidden_scalp
 from synth.face.lips import CLOSED, sealing
 from synth.face.mesh import FaceModel
+from synth.face.palette import Palette
 from synth.face.shading import openness, smooth, vertex_normals
 from synth.face.subdivision import catmull_clark
 from synth.face.surface import Surface, detach
@@ -24,6 +26,9 @@ _TOP_THICKNESS = 0.035
 """How far the top stands off the skin; dm."""
 _EARS = 0.35
 """How much blood shows in the ears."""
+_MATT = {"down": 0.35, "aside": 0.35, "back": 0.35, "curls": 1.0}
+"""How much less hair shines than skin, by the way it lies."""
+_LUMINANCE = np.array([0.21, 0.72, 0.07])
 
 _SMILE_ROUNDS = 12
 """Rounds of smoothing that take the sharp folds out of smiling cheeks."""
@@ -37,7 +42,7 @@ def skin(face: FaceModel) -> tuple[Surface, Surface]:
     vertices, template = matrix @ face.vertices, matrix @ face.template
     morphs = np.stack([matrix @ morph for morph in face.morphs])
     masks = {name: np.clip(matrix @ mask, 0, 1) for name, mask in face.masks.items()}
-    ears, lips, mouth = masks["ears"], masks["lips"], masks["inside-mouth"]
+    ears, lips, mouth = (masks[name] for name in ("ears", "lips", "inside-mouth"))
     vertices = _close_mouth(face, vertices, quads, morphs, masks)
     carry_brows(face, template, morphs)
     angle, height = wrap(template)
@@ -52,23 +57,8 @@ def skin(face: FaceModel) -> tuple[Surface, Surface]:
     hidden: NDArray[np.bool_] = hidden_scalp(look.hair, template, inside) | _behind_eyes(face, vertices)
     vertices = vertices + normals * layer[:, None]
 
-    colour = np.broadcast_to(np.array(palette.skin), vertices.shape)
-    cover = step(ears, 0.1, 0.6)
-    own = np.array(palette.skin) + _EARS * (np.array(palette.flush) - palette.skin)
-    upper, lower = (_lid_line(face, vertices, row) for row in (2, 1))
-    paints = (
-        *((ears, own, 1.0), (lips, palette.lips, 0.85), (mouth, _MOUTH, 1.0)),
-        *((lower, _LOWER_LID * palette.skin, 0.45), (upper, _UPPER_LID, 0.9)),
-    )
-    for mask, paint, strength in paints:
-        colour = colour + (np.asarray(paint) - colour) * (mask > 0.02)[:, None]
-        cover = np.maximum(cover, strength * step(mask, 0.1, 0.9))
-    matt = np.maximum(top, step(inside, -0.03, 0.03) * (1.0 if look.hair.strands == "curls" else 0.35))
-    # The broad sheen of light skin would lie like fog on dark skin, whose form shows in narrower highlights.
-    light = float(np.square(palette.skin) @ (0.21, 0.72, 0.07))
-    sheen = 0.052 + 0.040 * light + (0.05 + 0.09 * light) * lips
-    narrow = 28.0 - 28.0 * light + (8.0 + 14.0 * light) * lips + 10 * hair
-    gloss = np.stack([sheen * (1 - matt), narrow], axis=1)
+    lids = {f"{name}-lid": _lid_line(face, vertices, row) for name, row in (("lower", 1), ("upper", 2))}
+    colour, cover = _own_colours(palette, masks | lids)
     whole = Surface(
         name="skin",
         vertices=vertices,
@@ -78,11 +68,38 @@ def skin(face: FaceModel) -> tuple[Surface, Surface]:
         colour=colour,
         cover=cover,
         shade=shade,
-        gloss=gloss,
+        gloss=_gloss(palette, lips, np.maximum(top, _MATT[look.hair.strands] * step(inside, -0.03, 0.03))),
         follow=_follow(face, vertices),
         drawn=np.logical_not(hidden[quads].all(axis=1)),
     )
     return _open_behind(whole, template)
+
+
+def _own_colours(palette: Palette, masks: Mapping[str, Floats]) -> tuple[Floats, Floats]:
+    """Return colours (N, 3) of lips, ears, the inside of the mouth and the lids' margins, and how much they cover."""
+    skin = np.array(palette.skin)
+    ears = skin + _EARS * (np.array(palette.flush) - skin)
+    paints = (
+        *(("ears", ears, 1.0), ("lips", palette.lips, 0.85), ("inside-mouth", _MOUTH, 1.0)),
+        *(("lower-lid", _LOWER_LID * skin, 0.45), ("upper-lid", _UPPER_LID, 0.9)),
+    )
+    cover = np.zeros(len(masks["ears"]))
+    colour = np.broadcast_to(skin, (len(cover), 3))
+    for name, paint, strength in paints:
+        colour = np.where(masks[name][:, None] > 0.02, paint, colour)
+        cover = np.maximum(cover, strength * step(masks[name], 0.1, 0.9))
+    return colour, cover
+
+
+def _gloss(palette: Palette, lips: Floats, matt: Floats) -> Floats:
+    """Return strength and exponent of the highlight (N, 2).
+
+    The broad sheen of light skin would lie like fog on dark skin, whose form shows in narrower highlights.
+    """
+    light = float(np.square(palette.skin) @ _LUMINANCE)
+    strength = 0.052 + 0.040 * light + (0.05 + 0.09 * light) * lips
+    exponent = 28.0 - 28.0 * light + (8.0 + 14.0 * light) * lips + 10.0 * matt
+    return np.stack([strength * (1 - matt), exponent], axis=1)
 
 
 def _open_behind(whole: Surface, template: Floats) -> tuple[Surface, Surface]:
