@@ -25,7 +25,7 @@ _HALF_WIDTH = 0.326
 _WIDTHS = (0.088, 0.067, 0.077, 0.070, 0.066, 0.098)
 """Widths of the upper teeth from the middle outwards, in dm: two incisors, canine, two premolars, a molar."""
 _LENGTHS = (1.00, 0.89, 1.02, 0.86, 0.80, 0.74)
-_THICKNESS = (0.022, 0.022, 0.032, 0.050, 0.055, 0.070)
+_THICKNESS = (0.022, 0.022, 0.028, 0.040, 0.044, 0.052)
 """Their crowns' lengths as a share of the first one's, and their thickness near the biting edge, in dm."""
 _COLUMNS = ((-1.0, -0.7, 0.0, 0.7),) * 5 + ((-1.0, -0.6, 0.6),)
 """Columns of vertices across each tooth, from -1 on the side of the middle to 1 on the other, which is the next -1."""
@@ -36,7 +36,7 @@ _LEVELS = np.array(
     ]
 )
 """Rows of vertices: height above the biting edge as a share of the crown's length, and standing out in dm."""
-_LINGUAL = (1.6, 1.0)
+_LINGUAL = (1.3, 1.0)
 """How far the first rows, the back of the teeth, lie behind the edge, as a multiple of the thickness."""
 _GUM_LINE = 6
 """Row of vertices on the border of crown and gum."""
@@ -52,8 +52,8 @@ _NEAR = 0.45
 _STILL = 0.002
 """Movement of a helper in dm that is only noise of the data."""
 
-_TONGUE_DOWN, _TONGUE_BACK = 0.045, 0.03
-"""How far the tongue lies below and behind its helper; dm."""
+_TONGUE_DOWN, _BEHIND_TEETH, _BESIDE_TEETH = 0.045, 0.055, 0.085
+"""How far the tongue lies below its helper, its tip behind the front of the lower row, and its sides within it; dm."""
 _ROOT_DOWN, _FURROW = 0.10, 0.012
 """How much lower its root lies than that, and how deep the furrow along its middle is; dm."""
 
@@ -63,7 +63,7 @@ class _Row:
     """One row of teeth: lengths in dm.
 
     The arch is half an ellipse with its front at ``front``, as wide as twice ``half_width`` and as deep as ``depth``.
-    Sizes of teeth grow by ``scale``.
+    Sizes of teeth grow by ``scale``. Their roots lean inwards by ``lean`` for each length of a crown.
     """
 
     name: str
@@ -75,6 +75,7 @@ class _Row:
     depth: float
     edge: float
     length: float
+    lean: float
 
 
 def teeth(face: FaceModel) -> list[Surface]:
@@ -117,6 +118,7 @@ def _rows(face: FaceModel) -> tuple[_Row, _Row]:
         depth=front - back,
         edge=bite,
         length=0.103 * scale,
+        lean=0.0,
     )
     forwards = _room(face, first_try)
     return (
@@ -131,6 +133,7 @@ def _rows(face: FaceModel) -> tuple[_Row, _Row]:
             depth=front - back - 0.02 * scale,
             edge=bite + 0.006 * scale,
             length=0.090 * scale,
+            lean=0.03,
         ),
     )
 
@@ -181,7 +184,7 @@ def _teeth(row: _Row) -> Surface:
     gum = level > _GUM_LINE
     # Corners of the biting edge are round, teeth are parted by grooves, and the gum reaches down between them.
     share = share + 0.07 * beside**4 * (level <= 3) - 0.16 * beside**2.5 * (level >= _GUM_LINE) * (level < last_level)
-    out = row.scale * (out - np.where(gum, 0.004, 0.013) * beside**6)
+    out = row.scale * (out - np.where(gum, 0.004, 0.013) * beside**6 - row.lean * np.maximum(share - 0.5, 0.0))
     for behind, multiple in enumerate(_LINGUAL):
         out[behind] = -multiple * row.scale * np.asarray(_THICKNESS)[tooth]
     height = row.edge + row.up * row.length * np.asarray(_LENGTHS)[tooth] * share
@@ -282,9 +285,24 @@ def tongue(face: FaceModel) -> Surface:
     top = np.clip((vertices[:, 1] - low[1]) / (high - low)[1], 0, 1)
     # The root of the helper is high: lowered, it leaves a dark hollow above it when the jaw opens.
     down = _TONGUE_DOWN + _ROOT_DOWN * (1 - forward) ** 1.5 + _FURROW * middle * top
-    vertices = vertices - np.column_stack([np.zeros(n), down, np.full(n, _TONGUE_BACK)])
+    _, lower = _rows(face)
+    back = high[2] - (lower.front - _BEHIND_TEETH * lower.scale)
+    vertices = vertices - np.column_stack([np.zeros(n), down, np.full(n, back)])
+    vertices[:, 0] *= _narrowing(vertices, lower)
     colour = _TONGUE_ROOT + (_TONGUE_TIP - _TONGUE_ROOT) * forward[:, None]
     shade = (0.05 + 0.75 * forward**2.2) * (1 - 0.22 * middle * top)
     return _dull_in_shade(
         loose_surface("tongue", vertices, part.quads, morphs, colour, gloss=(0.24, 26.0), shade=shade)
     )
+
+
+def _narrowing(vertices: Floats, lower: _Row) -> Floats:
+    """Return the factors (N,) of the tongue's width with which each part fits between the teeth of the lower row."""
+    half_width = lower.half_width - _BESIDE_TEETH * lower.scale
+    z, x = vertices[:, 2], np.abs(vertices[:, 0])
+    knots = np.linspace(z.min(), z.max(), 12)
+    widest = np.array([x[np.abs(z - knot) < knots[1] - knots[0]].max() for knot in knots])
+    along = np.clip((knots - (lower.front - lower.depth)) / lower.depth, 0.0, 0.95)
+    room = half_width * np.sqrt(1 - along**2)
+    factors: Floats = np.interp(z, knots, np.minimum(1.0, room / widest))
+    return factors
