@@ -125,7 +125,7 @@ _ALL = (
         look=Look(
             hair=DRAWN_BACK,
             brows=Brows(thickness=0.8, arch=0.045, slant=0.0),
-            neckline=Neckline(height=5.44, drop=0.10),
+            neckline=Neckline(height=5.52, drop=0.10),
         ),
     ),
     Identity(
@@ -185,7 +185,7 @@ _ALL = (
             shirt=(0.720, 0.600, 0.330),
             iris=(0.210, 0.130, 0.085),
         ),
-        look=Look(hair=AFRO, brows=Brows(thickness=0.85, arch=0.05, density=0.92), neckline=Neckline(height=5.42)),
+        look=Look(hair=AFRO, brows=Brows(thickness=0.85, arch=0.05, density=0.92), neckline=Neckline(height=5.53)),
     ),
     Identity(
         name="kofi",
@@ -203,7 +203,7 @@ _ALL = (
             both_sides={"eyes/eye-scale-incr": 0.25},
         ),
         palette=Palette(
-            skin=(0.460, 0.308, 0.235),
+            skin=(0.475, 0.318, 0.243),
             flush=(0.450, 0.245, 0.185),
             lips=(0.425, 0.212, 0.185),
             hair=(0.085, 0.070, 0.065),
@@ -211,7 +211,9 @@ _ALL = (
             shirt=(0.760, 0.760, 0.740),
             iris=(0.190, 0.120, 0.080),
         ),
-        look=Look(hair=CLOSE_CROP, brows=Brows(thickness=1.15, raised=0.0, density=0.92), beard=0.5),
+        look=Look(
+            hair=CLOSE_CROP, brows=Brows(thickness=1.15, density=0.92), neckline=Neckline(height=5.60), beard=0.5
+        ),
     ),
 )
 
