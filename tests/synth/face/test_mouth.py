@@ -162,7 +162,7 @@ def test_incisors_and_canines_are_in_proportion(rig):
     upper = teeth(rig.face)[0]
     length = at["9.8"][1] - at["9.10"][1]
     share = (upper.vertices[:, 1] - at["9.10"][1]) / length
-    gap = (upper.colour[:, 0] < 0.62) & (upper.colour[:, 1] > 0.30) & (share > 0.3) & (share < 0.5)
+    gap = (upper.colour[:, 0] < 0.62) & (upper.colour[:, 1] > 0.30) & (share > 0.11) & (share < 0.19)
     gaps = upper.vertices[gap][:, [0, 2]]
     gaps = gaps[gaps[:, 0] > -1e-9]
     widths = np.linalg.norm(np.diff(gaps[np.argsort(gaps[:, 0])], axis=0), axis=1)
