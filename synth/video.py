@@ -219,7 +219,9 @@ def _command(path: Path, width: int, height: int, fps: float) -> list[str]:
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "pipe:0"),
         *("-an", "-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=bitexact"),
-        *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "veryfast", "-crf", "18", "-threads", "1"),
+        # The macroblock tree keeps files nearly as small as the next slower preset does, which takes a third longer.
+        *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "superfast", "-x264-params", "mbtree=1:rc-lookahead=10"),
+        *("-crf", "18", "-threads", "1"),
         *("-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709", "-color_range", "tv"),
         *_container(path),
     ]
