@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.mesh import FaceModel
-from synth.face.painting import wrap
+from synth.face.wrapping import wrap
 
 Floats = NDArray[np.float64]
 

@@ -9,9 +9,8 @@ from scipy.ndimage import zoom
 from synth.face.look import Look
 from synth.face.noise import Noise
 from synth.face.palette import Palette
-from synth.face.wrapping import CROWN, HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step, wrap
+from synth.face.wrapping import CROWN, HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step
 
-__all__ = ["HEIGHT", "WIDTH", "paint", "wrap"]
 
 Floats = NDArray[np.float64]
 
