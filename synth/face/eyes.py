@@ -160,6 +160,12 @@ def pupil_diameter(face: FaceModel) -> float:
     return float(sum(rings))
 
 
+def pupil_points(face: FaceModel) -> Floats:
+    """Return the middles of the left and the right pupil (2, 3) of eyes that look along +z, in dm."""
+    _, _, points = _ball(face)
+    return face.eye_centres + points[0]
+
+
 def _ball(face: FaceModel) -> tuple[Floats, Floats, Floats]:
     """Return angle from the pole, turn about it, and place (N, 3) relative to the centre, of a ball's vertices."""
     around = np.linspace(0, 2 * np.pi, _MERIDIANS, endpoint=False)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
-from synth.face.eyes import EYES, IRIS, PUPIL, eyeballs, lashes, pupil_diameter, pupil_growth
+from synth.face.eyes import EYES, IRIS, PUPIL, eyeballs, lashes, pupil_diameter, pupil_growth, pupil_points
 from synth.face.identity import IDENTITIES
 from synth.face.mesh import FaceModel, load_face
 from synth.face.motion import Motion
@@ -135,6 +135,12 @@ def test_diameter_of_the_pupil(face, ball):
     widest = 2 * np.linalg.norm(ball[black, :2], axis=1).max()
     assert widest < pupil_diameter(face) < 1.15 * widest
     assert 0.25 < pupil_diameter(face) / (2 * face.eye_radius * np.sin(IRIS)) < 0.5
+
+
+def test_middles_of_the_pupils_are_foremost(rig):
+    for name, middle in zip(EYES, pupil_points(rig.face), strict=True):
+        places = rig.rest[rig.spans[name]]
+        assert np.linalg.norm(places[places[:, 2].argmax()] - middle) < 1e-5
 
 
 def test_lashes_go_with_the_lids(rig, weights):
