@@ -83,12 +83,12 @@ class _Fringe:
 # to somebody; thin ones would break into dots.
 _FRINGES = {
     "female": (
-        _Fringe(lid="upper", count=28, length=0.44, width=1.2, lift=0.25, levels=3, softness=(0.0, 0.55)),
-        _Fringe(lid="lower", count=20, length=0.20, width=1.2, lift=-0.10, levels=2, softness=(0.68, 0.92)),
+        _Fringe(lid="upper", count=28, length=0.46, width=0.9, lift=0.25, levels=3, softness=(0.0, 0.55)),
+        _Fringe(lid="lower", count=20, length=0.20, width=0.9, lift=-0.10, levels=2, softness=(0.80, 0.95)),
     ),
     "male": (
-        _Fringe(lid="upper", count=26, length=0.30, width=1.2, lift=0.10, levels=2, softness=(0.20, 0.70)),
-        _Fringe(lid="lower", count=18, length=0.16, width=1.2, lift=-0.05, levels=2, softness=(0.75, 0.95)),
+        _Fringe(lid="upper", count=26, length=0.30, width=0.9, lift=0.10, levels=2, softness=(0.20, 0.70)),
+        _Fringe(lid="lower", count=18, length=0.16, width=0.9, lift=-0.05, levels=2, softness=(0.75, 0.95)),
     ),
 }
 
@@ -163,7 +163,8 @@ def pupil_diameter(face: FaceModel) -> float:
 def pupil_points(face: FaceModel) -> Floats:
     """Return the middles of the left and the right pupil (2, 3) of eyes that look along +z, in dm."""
     _, _, points = _ball(face)
-    return face.eye_centres + points[0]
+    middles: Floats = face.eye_centres + points[0]
+    return middles
 
 
 def _ball(face: FaceModel) -> tuple[Floats, Floats, Floats]:
