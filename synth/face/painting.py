@@ -11,7 +11,6 @@ from synth.face.noise import Noise
 from synth.face.palette import Palette
 from synth.face.wrapping import CROWN, HIGHEST, LOWEST, above_hairline, below_neckline, canvas, step
 
-
 Floats = NDArray[np.float64]
 
 WIDTH, HEIGHT = 1024, 1024
