@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-_TOLERANCE = 0.0025
-"""How far a large quad may be from the fine surface, in dm: half a pixel of a 720 x 576 picture."""
-_LIP_TOLERANCE, _EAR_TOLERANCE, _NECK_TOLERANCE, _TRUNK_TOLERANCE = 0.001, 0.005, 0.005, 0.010
+_TOLERANCE = 0.0035
+"""How far a large quad may be from the fine surface, in dm: two thirds of a pixel of a 720 x 576 picture."""
+_LIP_TOLERANCE, _EAR_TOLERANCE, _NECK_TOLERANCE, _TRUNK_TOLERANCE = 0.0015, 0.008, 0.007, 0.015
 """The same where lips touch, where nobody looks closely, and where the control mesh is coarse."""
 _CHIN = 0.16
 """How far the underside of the chin lies below the joint of the jaw; dm."""
