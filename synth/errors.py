@@ -14,7 +14,7 @@ class RenderError(SynthError):
 
 
 class VideoError(SynthError):
-    """A clip or picture could not be encoded or written."""
+    """A clip, a picture or another file could not be encoded or written."""
 
 
 class SpecError(SynthError, ValueError):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError, VideoError
+from synth.files import write_whole
 
 _MAX_RATE = 240
 
@@ -179,14 +180,7 @@ def write_png(path: Path, frame: NDArray[np.uint8]) -> None:
         If the file cannot be written.
     """
     _check(frame, None)
-    partial = _partial_name(path)
-    try:
-        partial.write_bytes(iio.imwrite("<bytes>", frame, extension=".png"))
-        partial.replace(path)
-    except OSError as error:
-        raise VideoError(f"The picture {path} could not be written: {error.strerror or error}.") from error
-    finally:
-        partial.unlink(missing_ok=True)
+    write_whole(path, iio.imwrite("<bytes>", frame, extension=".png"))
 
 
 def _check(frame: NDArray[Any], shape: tuple[int, int, int] | None) -> None:

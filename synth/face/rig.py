@@ -44,6 +44,8 @@ class Rig:
         Strength and exponent of the highlight.
     paint : (N, 4) float32
         Own colour, linear light, multiplied by its cover; then the weight of the texture.
+    follow : (N, 2) float64
+        How much each vertex follows the neck's and the skull's share of the head's rotation, 0 to 1.
     texture : (H, W, 3) uint8
         The painting of skin, brows and hair, sRGB.
     """
@@ -76,9 +78,9 @@ class Rig:
         self._morphs = sparse.csr_array(morphs.reshape(len(morphs), -1).T.astype(np.float64))
         around = sparse.block_diag([piece.around for piece in pieces])
         self._around = sparse.csr_array(around).astype(np.float32)
-        follow = np.concatenate([surface.follow for surface in surfaces])
+        self.follow = np.concatenate([surface.follow for surface in surfaces])
         self._pupil_growth = pupil_growth(face)
-        self._turns = _Turns(follow, face.pivots["neck"], face.pivots["head"])
+        self._turns = _Turns(self.follow, face.pivots["neck"], face.pivots["head"])
 
     def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
         """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion."""

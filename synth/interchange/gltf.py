@@ -40,8 +40,6 @@ JOINTS = ("root", "neck", "skull", "throat", *EYES)
 _PUPILS = ("pupilLeft", "pupilRight")
 # Displacements and changes of normals too small to be seen are left out, which halves the file.
 _SMALLEST_MOVE, _SMALLEST_TILT = 2e-6, 4e-3
-_PROBE = 1e-5
-"""Turn of the head, in radians, by which the rig's shares are measured: small, so that they add up."""
 
 
 def write_gltf(path: Path, rig: Rig, motion: Motion, *, fps: float) -> None:
@@ -181,7 +179,8 @@ def _skinning(rig: Rig) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
     The rig turns a place by its shares of two angles, the format blends the positions that whole turns give. At the
     corners, where a share is 0 or 1, both are the same; between them the weights are bilinear.
     """
-    neck, skull = _shares(rig).T
+    # The third digit is far below what is seen, and vertices that follow fully or not at all then have one joint.
+    neck, skull = np.round(rig.follow, 3).T
     weights = np.column_stack([(1 - neck) * (1 - skull), neck * (1 - skull), neck * skull, (1 - neck) * skull])
     weights = weights.astype(np.float32)
     joints = np.where(weights > 0, np.arange(4), 0).astype(np.uint8)
@@ -189,22 +188,6 @@ def _skinning(rig: Rig) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         joints[rig.spans[name]] = (JOINTS.index(name), 0, 0, 0)
         weights[rig.spans[name]] = (1, 0, 0, 0)
     return joints, weights
-
-
-def _shares(rig: Rig) -> Floats:
-    """Return the shares (N, 2) of the neck's and of the skull's turn that each vertex follows, measured on the rig."""
-    rest, _ = rig.pose(Motion.of())
-    turns = _PROBE * np.eye(3)
-    moved = np.concatenate([rig.pose(Motion.of(head=turn))[0] - rest for turn in turns], axis=1)
-    ways = []
-    for rotation, pivot in zip(_head_rotations(turns), (rig.face.pivots["neck"], rig.face.pivots["head"]), strict=True):
-        arm = rest - pivot
-        ways.append(np.concatenate([arm @ matrix.T - arm for matrix in rotation.as_matrix()], axis=1))
-    way = np.stack(ways, axis=2)
-    normal = np.einsum("nri,nrj->nij", way, way)
-    shares = np.linalg.solve(normal, np.einsum("nri,nr->ni", way, moved)[..., None])[..., 0]
-    # The third digit is far below what is seen, and vertices that follow fully or not at all then have one joint.
-    return np.clip(np.round(shares, 3), 0.0, 1.0)
 
 
 def _head_rotations(head: Floats) -> tuple[Rotation, Rotation]:
