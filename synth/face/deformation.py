@@ -15,7 +15,7 @@ from synth.face.morph_solver import MorphSolver
 from synth.face.motion import Motion
 from synth.face.rig import Rig
 from synth.fap.table import check_sequence, column
-from synth.fap.units import ANGLE_UNIT, STEPS, FaceUnits
+from synth.fap.units import ANGLE_UNIT, STEPS
 
 Floats = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
         If ``values`` is not a finite (T, 68) array.
     """
     sequence = check_sequence(values)
-    face, units = rig.face, FaceUnits.measure(rig.face)
+    face, units = rig.face, rig.units
     left = sequence[:, [column(23), column(25)]]
     right = sequence[:, [column(24), column(26)]]
     eyes = np.stack([left, right], axis=1) * ANGLE_UNIT

@@ -4,7 +4,8 @@ A point is a vertex of MakeHuman's base mesh, given by its number in ``base.obj`
 identity. The points were found on the mesh's own loops: the inner lip contour is the loop along which the lips touch,
 the outer one the loop on the edge of the red; the lid points lie on the loop of the lid's front edge, above and below
 the pupil; the brow points on the ridge that the brow morphs move most. The mesh is symmetric to the last digit, and so
-is this table. Of the 84 points only 11.5, the thickness of the hair, has no place on a face without hair.
+is this table. Points on pupils, teeth and tongue are taken from the pieces that are drawn. Of the 84 points only 11.5,
+the top of the hair, is not known before the hair is dressed: `synth.face.rig.Rig.feature_points` adds it.
 """
 
 from collections.abc import Iterable
@@ -14,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError
+from synth.face.eyes import pupil_points
 from synth.face.mesh import FaceModel
+from synth.face.mouth import teeth_points, tongue
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -65,10 +68,6 @@ MIDDLE = MappingProxyType(
         "8.1": 455,  # outer upper lip
         "8.2": 492,  # outer lower lip
         "9.3": 297,  # tip of the nose
-        "9.8": 15061,  # top of the upper teeth
-        "9.9": 14993,  # bottom of the lower teeth
-        "9.10": 15069,  # bottom of the upper teeth
-        "9.11": 15010,  # top of the lower teeth
         "9.12": 5063,  # lower edge of the nose bone
         "9.15": 5072,  # where the nose meets the upper lip
         "11.1": 983,  # hairline above the forehead
@@ -81,10 +80,10 @@ MIDDLE = MappingProxyType(
 VERTICES = MappingProxyType(
     {**MIDDLE, **{left: at for left, _, at, _ in PAIRS}, **{right: at for _, right, _, at in PAIRS}}
 )
-"""All points that are vertices: name, number in ``base.obj``."""
+"""All points that are vertices of skin or tongue: name, number in ``base.obj``."""
 
 PUPILS = ("3.5", "3.6")
-"""Points 3.5 and 3.6, left and right: the foremost points of the eyeballs."""
+"""Points 3.5 and 3.6, left and right: the middles of the pupils."""
 
 SPINE = "7.1"
 """Point 7.1, the top of the spine, about which the head turns."""
@@ -92,8 +91,8 @@ SPINE = "7.1"
 TONGUE_START = 13380
 """Number in ``base.obj`` of the tongue's first vertex."""
 
-# The loose parts are runs of base.obj; their rows in FaceModel.parts follow the same order.
-_PART_START = {"tongue": TONGUE_START, "lower-teeth": 14992, "upper-teeth": 15060}
+HAIR_TOP, SKULL_TOP = "11.5", "11.4"
+"""Point 11.5, the top of the hair, and the point below it."""
 
 
 def skin_rows(face: FaceModel, names: Iterable[str]) -> Indices:
@@ -129,21 +128,19 @@ def skin_rows(face: FaceModel, names: Iterable[str]) -> Indices:
 
 
 def feature_points(face: FaceModel) -> dict[str, Floats]:
-    """Return the neutral position of every feature point that the face has.
+    """Return the neutral position of every feature point but 11.5.
 
     Returns
     -------
     dict of str to (3,) float64
         Positions in dm; x to the subject's left, y up, z forward.
     """
-    points: dict[str, Floats] = {}
-    inside = {name: number for name, number in VERTICES.items() if name.startswith("6.") or number >= 14992}
-    for name, number in inside.items():
-        part = max((start, part) for part, start in _PART_START.items() if start <= number)[1]
-        points[name] = face.parts[part].vertices[number - _PART_START[part]]
+    inside = [name for name in VERTICES if name.startswith("6.")]
     skin = [name for name in VERTICES if name not in inside]
-    points.update(zip(skin, face.vertices[skin_rows(face, skin)], strict=True))
-    forward = np.array([0.0, 0.0, face.eye_radius])
-    points.update(zip(PUPILS, face.eye_centres + forward, strict=True))
+    points = dict(zip(skin, face.vertices[skin_rows(face, skin)], strict=True))
+    body = tongue(face).vertices
+    points.update({name: body[VERTICES[name] - TONGUE_START] for name in inside})
+    points.update(zip(PUPILS, pupil_points(face), strict=True))
+    points.update(teeth_points(face))
     points[SPINE] = face.pivots["head"]
     return points

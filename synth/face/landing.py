@@ -7,7 +7,7 @@ from synth.face.morph_solver import CORNERS
 from synth.face.residual import displacing_faps
 from synth.face.rig import Rig
 from synth.fap.table import column
-from synth.fap.units import ANGLE_UNIT, STEPS, FaceUnits
+from synth.fap.units import ANGLE_UNIT, STEPS
 
 Floats = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ class Landing:
         self._reach, self._kernel = rig.control.reach, rig.control.kernel
         points = rig.control.names
         number = {name: k for k, name in enumerate(points)}
-        steps = FaceUnits.measure(rig.face).steps()
+        steps = rig.units.steps()
         self._along = np.zeros((len(steps), len(points), 3))
         for fap in displacing_faps():
             if fap.direction is not None:

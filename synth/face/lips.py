@@ -8,8 +8,12 @@ from synth.face.shading import smooth, vertex_normals
 
 Floats = NDArray[np.float64]
 
-CLOSED = ("mouthPress", "mouthFrown", "mouthSmile", "mouthDimple", "mouthStretch")
-"""Morphs (Left and Right) that leave the mouth closed."""
+CLOSED = (
+    *("mouthPressLeft", "mouthPressRight", "mouthFrownLeft", "mouthFrownRight", "mouthSmileLeft", "mouthSmileRight"),
+    *("mouthDimpleLeft", "mouthDimpleRight", "mouthStretchLeft", "mouthStretchRight", "mouthLeft", "mouthRight"),
+    *("cheekPuff", "mouthRollLower", "jawForward"),
+)
+"""Morphs that leave the mouth closed."""
 
 _OVERLAP = 0.006
 _REACH = 0.05

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from synth.face.feature_points import PAIRS, VERTICES
 from synth.face.rig import Rig
 from synth.fap.table import Fap, column, faps
-from synth.fap.units import FaceUnits
 
 Floats = NDArray[np.float64]
 
@@ -96,7 +95,7 @@ class MorphSolver:
         places = _symmetrised(rig.control.reach[self.morphs], points, names)
         reach = np.einsum("mfx,fx->fm", places[:, self._points], directions)
         self._columns = np.array([column(fap.fap) for fap in rows])
-        self._steps = FaceUnits.measure(face).steps()[self._columns]
+        self._steps = rig.units.steps()[self._columns]
         costs = np.array([_COST_OF.get(name, _COST) for name in names])
         self._cost = np.diag(costs**2)
         numbers = [fap.fap for fap in rows]

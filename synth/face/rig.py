@@ -7,12 +7,17 @@ from scipy.spatial.transform import Rotation
 
 from synth.face.appearance import dress
 from synth.face.eyes import EYES, pupil_growth
+from synth.face.feature_points import HAIR_TOP, SKULL_TOP, VERTICES, feature_points, skin_rows
 from synth.face.mesh import FaceModel
 from synth.face.motion import Motion
 from synth.face.residual import ControlPoints
 from synth.face.tessellation import reduced
+from synth.fap.units import FaceUnits
 
 Floats = NDArray[np.float64]
+
+_NEAR_CROWN = 0.15
+"""How far from the top of the skull the top of the hair is looked for; dm."""
 
 NECK_SHARE = 0.4
 """Part of the head's rotation that happens along the neck; the rest happens at the base of the skull."""
@@ -34,6 +39,8 @@ class Rig:
         Rows of each surface, by its name.
     control : ControlPoints
         The feature points that FAPs displace.
+    units : FaceUnits
+        The face animation parameter units of the face.
     rest : (N, 3) float32
         Neutral positions in dm.
     triangles : (T, 3) uint32
@@ -71,6 +78,7 @@ class Rig:
             [np.column_stack([s.colour**2 * (s.cover * s.shade)[:, None], (1 - s.cover) * s.shade]) for s in surfaces]
         ).astype(np.float32)
         self.control = ControlPoints(face, surfaces)
+        self.units = FaceUnits.measure(face)
         self._rest = rest
         faces = np.concatenate([piece.faces + start for piece, start in zip(pieces, starts[:-1], strict=True)])
         self._corners = np.ascontiguousarray(faces.T)
@@ -81,6 +89,17 @@ class Rig:
         self.follow = np.concatenate([surface.follow for surface in surfaces])
         self._pupil_growth = pupil_growth(face)
         self._turns = _Turns(self.follow, face.pivots["neck"], face.pivots["head"])
+
+    def feature_points(self) -> dict[str, Floats]:
+        """Return the neutral positions of all 84 feature points of MPEG-4 on the drawn figure: (3,), dm."""
+        points = feature_points(self.face)
+        skin = [name for name in VERTICES if not name.startswith("6.")]
+        points.update(zip(skin, self._rest[self.spans["skin"].start + skin_rows(self.face, skin)], strict=True))
+        # The scalp's rows carry the hair's thickness, so the skull lies where the bare face has it.
+        points[SKULL_TOP] = feature_points(self.face)[SKULL_TOP]
+        above = np.hypot(*(self._rest - points[SKULL_TOP])[:, [0, 2]].T) < _NEAR_CROWN
+        points[HAIR_TOP] = points[SKULL_TOP] * (1, 0, 1) + (0, self._rest[above, 1].max(), 0)
+        return points
 
     def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
         """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion."""

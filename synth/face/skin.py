@@ -68,7 +68,9 @@ def skin(face: FaceModel) -> tuple[Surface, Surface]:
         colour=colour,
         cover=cover,
         shade=shade,
-        gloss=_gloss(palette, lips, np.maximum(top, _MATT[look.hair.strands] * step(inside, -0.03, 0.03))),
+        gloss=_gloss(
+            palette, lips, np.maximum.reduce([top, mouth, _MATT[look.hair.strands] * step(inside, -0.03, 0.03)])
+        ),
         follow=_follow(face, vertices),
         drawn=np.logical_not(hidden[quads].all(axis=1)),
     )
@@ -129,12 +131,9 @@ def _close_mouth(
 
     jaw_drop = -morphs[number["jawOpen"], :, 1]
     vertices = vertices + sealing(vertices, quads, lips, jaw_drop)
-    leftward = step(vertices[:, 0], -0.1, 0.1)[:, None]
     for name in CLOSED:
-        left, right = (morphs[number[name + side]] for side in ("Left", "Right"))
-        seal = sealing(vertices + left + right, quads, lips, jaw_drop)
-        left += leftward * seal
-        right += (1 - leftward) * seal
+        morph = morphs[number[name]]
+        morph += sealing(vertices + morph, quads, lips, jaw_drop)
     return vertices
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError
-from synth.face.feature_points import feature_points
+from synth.face.feature_points import skin_rows
 from synth.face.mesh import FaceModel
 from synth.fap.table import FAP_COUNT, column, faps
 
@@ -52,12 +52,15 @@ class FaceUnits:
     @classmethod
     def measure(cls, face: FaceModel) -> Self:
         """Measure the units on the neutral face (ISO/IEC 14496-2, Annex C)."""
-        at = feature_points(face)
+        names = ("3.1", "3.2", "3.3", "3.4", "9.15", "2.2", "8.3", "8.4")
+        at = dict(zip(names, face.vertices[skin_rows(face, names)], strict=True))
+        # Eyes that look straight ahead have their pupils, 3.5 and 3.6, right before their centres.
+        left, right = face.eye_centres
         x, y = 0, 1
         return cls(
             IRISD=float(at["3.1"][y] - at["3.3"][y] + at["3.2"][y] - at["3.4"][y]) / 2.0,
-            ES=float(at["3.5"][x] - at["3.6"][x]),
-            ENS=float((at["3.5"][y] + at["3.6"][y]) / 2.0 - at["9.15"][y]),
+            ES=float(left[x] - right[x]),
+            ENS=float((left[y] + right[y]) / 2.0 - at["9.15"][y]),
             MNS=float(at["9.15"][y] - at["2.2"][y]),
             MW=float(at["8.3"][x] - at["8.4"][x]),
         )

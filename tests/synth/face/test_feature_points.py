@@ -3,13 +3,10 @@ import pytest
 
 from synth.errors import SpecError
 from synth.face.feature_points import PAIRS, VERTICES, feature_points, skin_rows
+from synth.face.identity import IDENTITIES
 from synth.face.mesh import load_face
+from synth.face.rig import Rig
 from synth.fap.table import faps
-
-
-@pytest.fixture
-def face(face_dir):
-    return load_face(face_dir)
 
 
 @pytest.fixture
@@ -17,12 +14,26 @@ def at(face):
     return feature_points(face)
 
 
-def test_all_but_the_thickness_of_the_hair(at):
+def test_all_eighty_four(at, rig):
     # ISO/IEC 14496-2 has 84 feature points in eleven groups of these sizes.
     sizes = [14, 14, 6, 4, 4, 1, 10, 15, 10, 6]
     names = {f"{group}.{k}" for group, size in zip(range(2, 12), sizes, strict=True) for k in range(1, size + 1)}
     assert len(names) == 84
+    assert set(rig.feature_points()) == names
     assert set(at) == names - {"11.5"}
+
+
+@pytest.mark.parametrize("identity", sorted(IDENTITIES))
+def test_drawn_points_lie_on_the_figure(face_dir, identity):
+    """Each is a vertex that is drawn, or close to one; the hair rises over the skull."""
+    rig = Rig(load_face(face_dir, identity))
+    points = rig.feature_points()
+    drawn = rig.rest[np.unique(rig.triangles)]
+    for name, place in points.items():
+        if name in {"7.1", "11.1", "11.2", "11.3", "11.4", "11.6"}:
+            continue
+        assert np.linalg.norm(drawn - place, axis=1).min() < (0.12 if name == "11.5" else 0.05), name
+    assert 0.01 < points["11.5"][1] - points["11.4"][1] < 0.8
 
 
 def test_every_fap_of_the_face_has_its_points(at):
