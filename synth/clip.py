@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 LANGUAGES = ("en", "zh")
 MAX_TEXT = 1000
-FORMAT = 1
+FORMAT = 2
 """Part of a clip's identity; raise it when clips change though specification, models, face and renderer stay."""
 
 _SECONDS_PER_WORD = 0.35
