@@ -93,21 +93,29 @@ class Canvas:
         self._uploaded: NDArray[np.float32] | None = None
         self._undrawn = self._unread = _NOTHING
 
-    def picture(self, pose: NDArray[np.float32]) -> NDArray[np.uint8]:
-        """Return the picture of a pose, which is drawn now unless it is the one last shown."""
+    def picture(self, pose: NDArray[np.float32], following: NDArray[np.float32] | None = None) -> NDArray[np.uint8]:
+        """Return the picture of a pose, which is drawn now unless it is the one last shown; begin the following one.
+
+        Whatever can be done before the drawing has ended or after the next one has begun, is.
+        """
         if self._shown is not pose:
             self.show(pose)
-        return self.read()
+        box = self._changed(following) if following is not None else _NOTHING
+        self.read()
+        if following is not None:
+            self.upload(following, box)
+            self.draw()
+        return self._picture[::-1].copy()
 
     def show(self, pose: NDArray[np.float32]) -> None:
         """Begin to draw a pose, positions and normals side by side (N, 6)."""
         self.upload(pose)
         self.draw()
 
-    def upload(self, pose: NDArray[np.float32]) -> None:
-        """Write new vertices into the mesh's buffer and note where they change the picture."""
+    def upload(self, pose: NDArray[np.float32], box: Box | None = None) -> None:
+        """Write new vertices into the mesh's buffer; ``box`` is where they change the picture, if known."""
         gl = self._gl
-        self._undrawn = self._changed(pose)
+        self._undrawn = self._changed(pose) if box is None else box
         # Whatever fails from here on, the next pose is drawn completely.
         self._shown, self._uploaded = None, pose
         self._vertices[:, :6] = pose
@@ -116,10 +124,10 @@ class Canvas:
         gl.glBindBuffer(gl.GL_ARRAY_BUFFER, 0)
 
     def draw(self) -> None:
-        """Draw what is new."""
-        gl = self._gl
+        """Draw what is new, and average its samples."""
+        gl, surface = self._gl, self._surface
         left, low, right, high = self._undrawn
-        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, self._surface._main_fb_ms)
+        gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, surface._main_fb_ms)
         gl.glViewport(0, 0, *self._size)
         gl.glEnable(gl.GL_SCISSOR_TEST)
         gl.glScissor(left, low, right - left, high - low)
@@ -137,24 +145,25 @@ class Canvas:
         self._primitive._unbind()
         self._texture._unbind()
         gl.glDisable(gl.GL_SCISSOR_TEST)
+        if self._undrawn != _NOTHING:
+            gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, surface._main_fb_ms)
+            gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, surface._main_fb)
+            gl.glBlitFramebuffer(*self._undrawn, *self._undrawn, gl.GL_COLOR_BUFFER_BIT, gl.GL_NEAREST)
         gl.glFlush()
         self._unread = _union(self._unread, self._undrawn)
         self._shown = self._uploaded
 
-    def read(self) -> NDArray[np.uint8]:
-        """Average the samples of what is new, read it, and return the whole picture, top row first."""
+    def read(self) -> None:
+        """Wait for the drawing's end and take over what is new into the picture."""
+        if self._unread == _NOTHING:
+            return
+        gl = self._gl
         left, low, right, high = self._unread
-        if self._unread != _NOTHING:
-            gl, surface = self._gl, self._surface
-            gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, surface._main_fb_ms)
-            gl.glBindFramebuffer(gl.GL_DRAW_FRAMEBUFFER, surface._main_fb)
-            gl.glBlitFramebuffer(*self._unread, *self._unread, gl.GL_COLOR_BUFFER_BIT, gl.GL_NEAREST)
-            gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, surface._main_fb)
-            gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
-            pixels = gl.glReadPixels(left, low, right - left, high - low, gl.GL_RGB, gl.GL_UNSIGNED_BYTE)
-            self._picture[low:high, left:right] = np.frombuffer(pixels, np.uint8).reshape(high - low, right - left, 3)
-            self._unread = _NOTHING
-        return self._picture[::-1].copy()
+        gl.glBindFramebuffer(gl.GL_READ_FRAMEBUFFER, self._surface._main_fb)
+        gl.glPixelStorei(gl.GL_PACK_ALIGNMENT, 1)
+        pixels = gl.glReadPixels(left, low, right - left, high - low, gl.GL_RGB, gl.GL_UNSIGNED_BYTE)
+        self._picture[low:high, left:right] = np.frombuffer(pixels, np.uint8).reshape(high - low, right - left, 3)
+        self._unread = _NOTHING
 
     def finish(self) -> None:
         """Wait until all is drawn."""

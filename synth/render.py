@@ -48,9 +48,9 @@ class StageTimes:
     upload : float
         Vertices to the graphics context, and finding out what changes in the picture.
     draw : float
-        Drawing, four samples a pixel.
+        Drawing, four samples a pixel, and averaging the samples.
     readback : float
-        Averaging the samples and reading the picture.
+        Reading the picture.
     """
 
     pose: float
@@ -130,10 +130,9 @@ class Renderer:
         for start, end in itertools.pairwise([*starts, len(motion)]):
             following = self._pose(motion, end) if end < len(motion) else None
             with self._open() as canvas:
-                picture = canvas.picture(pose)
-                if following is not None:
-                    canvas.show(following)
-                    pose = following
+                picture = canvas.picture(pose, following)
+            if following is not None:
+                pose = following
             yield from itertools.repeat(picture, end - start)
 
     def timed_frame(self, motion: Motion, frame: int = 0) -> tuple[NDArray[np.uint8], StageTimes]:
@@ -146,7 +145,7 @@ class Renderer:
                 step()
                 canvas.finish()
                 times.append(time.perf_counter())
-            picture = canvas.read()
+            picture = canvas.picture(pose)
         times.append(time.perf_counter())
         return picture, StageTimes(*np.diff(times).tolist())
 
