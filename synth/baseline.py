@@ -1,6 +1,8 @@
 """The straightforward way to film a figure with pyrender, for comparison: a new mesh for each frame, stock shaders."""
 
 from collections.abc import Iterator
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,51 +16,64 @@ _LIGHTS = ((0.4286, 0.4682, 0.7726), (-0.7428, 0.1094, 0.6605), (-0.4391, 0.5269
 """Directions towards key, fill and rim light."""
 
 
-def naive_frames(rig: Rig, motion: Motion, *, width: int, height: int) -> Iterator[NDArray[np.uint8]]:
-    """Draw all frames of a motion as pyrender's documentation shows it.
+class NaiveRenderer:
+    """Draw a figure as pyrender's documentation shows it; a context manager.
 
     Mesh, poses, picture size, multisampling and the number of lights are those of `synth.render.Renderer`; the material
     is pyrender's own, so that the pictures are alike, not equal.
 
-    Yields
-    ------
-    (height, width, 3) uint8
-        The pictures, sRGB, top row first.
+    Parameters
+    ----------
+    rig : Rig
+        The figure.
+    width, height : int
+        Size of the frames in pixels.
     """
-    with current_graphics() as graphics:
-        pyrender = graphics.pyrender
-        scene = pyrender.Scene(bg_color=(*BACKGROUND, 1.0), ambient_light=(0.3, 0.3, 0.3))
-        at, field_of_view = camera(rig.face, width, height)
-        scene.add(pyrender.PerspectiveCamera(yfov=field_of_view, znear=1.0, zfar=100.0), pose=_placed(np.eye(3), at))
-        for towards in _LIGHTS:
-            scene.add(pyrender.DirectionalLight(intensity=2.0), pose=_placed(_facing(np.array(towards)), np.zeros(3)))
-        texture = pyrender.Texture(source=rig.texture, source_channels="RGB")
-        material = pyrender.MetallicRoughnessMaterial(
-            baseColorTexture=texture, metallicFactor=0.0, roughnessFactor=0.6, doubleSided=False
-        )
-        surface = pyrender.Renderer(width, height)
-    colours = np.sqrt(rig.paint[:, :3]) + rig.paint[:, 3:]
-    node = None
-    try:
+
+    def __init__(self, rig: Rig, *, width: int, height: int) -> None:
+        self._rig = rig
+        self._colours = np.column_stack([np.sqrt(rig.paint[:, :3]) + rig.paint[:, 3:], np.ones(len(rig.paint))])
+        with current_graphics() as graphics:
+            self._pyrender = pyrender = graphics.pyrender
+            self._scene = pyrender.Scene(bg_color=(*BACKGROUND, 1.0), ambient_light=(0.3, 0.3, 0.3))
+            at, field_of_view = camera(rig.face, width, height)
+            lens = pyrender.PerspectiveCamera(yfov=field_of_view, znear=1.0, zfar=100.0)
+            self._scene.add(lens, pose=_placed(np.eye(3), at))
+            for towards in _LIGHTS:
+                light = pyrender.DirectionalLight(intensity=2.0)
+                self._scene.add(light, pose=_placed(_facing(np.array(towards)), np.zeros(3)))
+            texture = pyrender.Texture(source=rig.texture, source_channels="RGB")
+            self._material = pyrender.MetallicRoughnessMaterial(
+                baseColorTexture=texture, metallicFactor=0.0, roughnessFactor=0.6, doubleSided=False
+            )
+            self._surface = pyrender.Renderer(width, height)
+
+    def frames(self, motion: Motion) -> Iterator[NDArray[np.uint8]]:
+        """Draw all frames of a motion, each with a new mesh: (height, width, 3) uint8, sRGB, top row first."""
         for frame in range(len(motion)):
-            positions, normals = rig.pose(motion, frame)
+            positions, normals = self._rig.pose(motion, frame)
             with current_graphics():
-                if node is not None:
-                    scene.remove_node(node)
-                primitive = pyrender.Primitive(
+                primitive = self._pyrender.Primitive(
                     positions=positions,
                     normals=normals,
-                    texcoord_0=rig.uv,
-                    color_0=np.column_stack([colours, np.ones(len(colours))]),
-                    indices=rig.triangles,
-                    material=material,
+                    texcoord_0=self._rig.uv,
+                    color_0=self._colours,
+                    indices=self._rig.triangles,
+                    material=self._material,
                 )
-                node = scene.add(pyrender.Mesh([primitive]))
-                picture, _depths = surface.render(scene, pyrender.RenderFlags.OFFSCREEN)
+                node = self._scene.add(self._pyrender.Mesh([primitive]))
+                picture, _depths = self._surface.render(self._scene, self._pyrender.RenderFlags.OFFSCREEN)
+                self._scene.remove_node(node)
             yield np.ascontiguousarray(picture)
-    finally:
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         with current_graphics():
-            surface.delete()
+            self._surface.delete()
 
 
 def _placed(rotation: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:

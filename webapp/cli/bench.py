@@ -12,7 +12,7 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.baseline import naive_frames
+from synth.baseline import NaiveRenderer
 from synth.expression.pad_pep import load_model
 from synth.expression.pep_fap import pep_to_fap
 from synth.face import assets
@@ -27,7 +27,7 @@ from webapp.cli.context import echo_json
 from webapp.config import Settings
 
 REPEATS = 5
-SECONDS, NAIVE_SECONDS, FPS = 5, 1, 25
+SECONDS, NAIVE_SECONDS, FPS = 5, 2, 25
 WIDTH, HEIGHT = 720, 576
 MEMORY_SECONDS = (10, 60)
 
@@ -87,15 +87,15 @@ def _speed(folder: Path) -> dict[str, float]:
     rig = Rig(load_face(folder))
     faps = talking(SECONDS)
     pairs = []
-    with Renderer(rig, width=WIDTH, height=HEIGHT) as renderer, TemporaryDirectory() as place:
+    with (
+        TemporaryDirectory() as place,
+        Renderer(rig, width=WIDTH, height=HEIGHT) as renderer,
+        NaiveRenderer(rig, width=WIDTH, height=HEIGHT) as naive,
+    ):
         out = Path(place) / "clip.mp4"
-
-        def naive(motion: Motion) -> Iterable[NDArray[np.uint8]]:
-            return naive_frames(rig, motion, width=WIDTH, height=HEIGHT)
-
         for _ in range(REPEATS + 1):
             own = _frames_per_second(faps, rig, renderer.frames, out)
-            pairs.append((own, _frames_per_second(faps[: NAIVE_SECONDS * FPS], rig, naive, out)))
+            pairs.append((own, _frames_per_second(faps[: NAIVE_SECONDS * FPS], rig, naive.frames, out)))
         shares = _shares(faps, rig, renderer, out)
     # The first pair warms up and does not count.
     own, other = (median(side) for side in zip(*pairs[1:], strict=True))
