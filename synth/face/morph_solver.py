@@ -44,12 +44,14 @@ _GAP_COUNT = 1.5
 
 # Cost of a weight of 1, as a distance in dm: small, so that it only decides between morphs that do the same. Morphs
 # that are no part of an ordinary expression cost more, as those that pull the mouth to one side.
-_COST = 0.008
+_COST = 0.014
 _COST_OF = {
-    **dict.fromkeys(("mouthLeft", "mouthRight", "jawLeft", "jawRight"), 0.06),
-    **dict.fromkeys(("cheekPuff", "jawForward", "mouthFunnel", "mouthRollUpper"), 0.03),
-    **dict.fromkeys(("mouthPucker", "mouthRollLower"), 0.015),
-    **dict.fromkeys(("mouthLowerDownLeft", "mouthLowerDownRight"), 0.008),
+    **dict.fromkeys(("mouthLeft", "mouthRight", "jawLeft", "jawRight", "cheekPuff"), 0.06),
+    **dict.fromkeys(("jawForward", "mouthFunnel", "mouthRollUpper"), 0.03),
+    **dict.fromkeys(("mouthPucker", "mouthRollLower", "mouthPressLeft", "mouthPressRight"), 0.025),
+    # An open mouth shows its lower teeth where these bare them instead of the jaw's going down.
+    **dict.fromkeys(("mouthLowerDownLeft", "mouthLowerDownRight"), 0.025),
+    **dict.fromkeys(("jawOpen", "mouthSmileLeft", "mouthSmileRight"), 0.006),
 }
 
 # A point that a FAP displaces along one axis stays where it is along the others. The morphs are asked to see to it by
@@ -59,8 +61,9 @@ _ACROSS_COUNT = 0.3
 CORNERS = ("2.4", "2.5", "8.3", "8.4")
 """The corners of the mouth, inner and outer, left and right."""
 
-# The depth of the corners is nearly free, as they slide round the teeth.
-_CORNER_DEPTH = 0.3
+# Depth that the morphs need not see to: the corners slide round the teeth, and a jaw that turns takes the chin back.
+_DEEP = (*CORNERS, "2.1")
+_DEPTH_COUNT = 0.2
 
 _STEPS = 600
 _RELAXATION = 1.6
@@ -108,7 +111,7 @@ class MorphSolver:
             (p, axis) for p in dict.fromkeys(self._points.tolist()) for axis in range(3) if (p, axis) not in moved
         ]
         self._across = np.array([p for p, _ in across])
-        self._deep = np.array([points[p] in CORNERS for p, _ in across])
+        self._deep = np.array([points[p] in _DEEP for p, _ in across])
         aside = np.array([places[:, p, axis] for p, axis in across])
         self._reach = np.vstack([reach, self._gaps @ reach, aside])
         self._limit = np.array([_LIMIT_OF.get(name, _LIMIT) for name in names])
@@ -136,7 +139,7 @@ class MorphSolver:
             [
                 self._counts(distances),
                 np.full((len(distances), len(_LIP_GAPS)), _GAP_COUNT),
-                _ACROSS_COUNT * driven[:, self._across] * np.where(self._deep, _CORNER_DEPTH, 1.0),
+                _ACROSS_COUNT * driven[:, self._across] * np.where(self._deep, _DEPTH_COUNT, 1.0),
             ]
         )
         distances = np.hstack([distances, distances @ self._gaps.T, np.zeros((len(distances), len(self._across)))])
