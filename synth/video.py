@@ -17,6 +17,7 @@ from synth.errors import SpecError, VideoError
 from synth.files import write_whole
 
 _MAX_RATE = 240
+_TAGS = "setparams=color_primaries=bt709:color_trc=bt709"
 
 
 class VideoWriter:
@@ -194,13 +195,16 @@ def _check_sound(audio: Path) -> None:
     try:
         with wave.open(str(audio), "rb") as sound:
             samples = sound.getnframes()
+            promised = samples * sound.getnchannels() * sound.getsampwidth()
     except OSError as error:
         raise VideoError(f"The sound {audio} could not be read: {error.strerror or error}.") from error
     except (wave.Error, EOFError) as error:
         reason = str(error) or "it ends too early"
-        raise VideoError(f"The sound {audio} is not a WAV file with PCM samples ({reason}).") from error
+        raise VideoError(f"The sound {audio} is not a plain WAV file ({reason}); it must be 16-bit PCM.") from error
     if not samples:
         raise VideoError(f"The sound {audio} holds no samples; leave it out for a silent film.")
+    if audio.stat().st_size < promised:
+        raise VideoError(f"The sound {audio} is cut off: it promises {promised} bytes of samples; copy it again.")
 
 
 def _partial_name(path: Path) -> Path:
@@ -212,7 +216,8 @@ def _command(path: Path, width: int, height: int, fps: float) -> list[str]:
     return [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
         *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "pipe:0"),
-        *("-an", "-vf", "scale=out_color_matrix=bt709:out_range=tv:flags=bitexact"),
+        # The options below tag the stream only; the encoder takes primaries and transfer from the frames.
+        *("-an", "-vf", f"scale=out_color_matrix=bt709:out_range=tv:flags=bitexact,{_TAGS}"),
         # The macroblock tree keeps files nearly as small as the next slower preset does, which takes a third longer.
         *("-c:v", "libx264", "-pix_fmt", "yuv420p", "-preset", "superfast", "-x264-params", "mbtree=1:rc-lookahead=10"),
         *("-crf", "18", "-threads", "1"),
@@ -225,7 +230,7 @@ def _sound_command(silent: Path, audio: Path, path: Path, seconds: float) -> lis
     """Compose the call that copies the pictures and encodes the sound, padded or cut to their duration."""
     return [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
-        *("-i", f"file:{silent}", "-i", f"file:{audio}", "-map", "0:v", "-map", "1:a"),
+        *("-i", f"file:{silent}", "-f", "wav", "-i", f"file:{audio}", "-map", "0:v", "-map", "1:a"),
         *("-c:v", "copy", "-af", f"apad,atrim=duration={seconds:.6f}", "-c:a", "aac", "-b:a", "128k"),
         *("-flags:a", "+bitexact", "-threads", "1"),
         *_container(path),

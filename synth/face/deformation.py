@@ -65,10 +65,9 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     weights = np.zeros((len(sequence), len(face.morph_names)))
     _follow_gaze(weights, eyes, face.morph_names)
     morphs, points = MorphSolver(rig), Landing(rig)
-    residual = np.zeros((len(sequence), len(rig.control.names), 3))
     # Clips hold still for long: each different frame is solved once.
     frames, first, place = np.unique(sequence, axis=0, return_index=True, return_inverse=True)
-    own_weights, own_residual = weights[first], residual[first]
+    own_weights, own_residual = weights[first], np.zeros((len(frames), len(rig.control.names), 3))
     for start in range(0, len(frames), _BATCH):
         batch = slice(start, start + _BATCH)
         targets, driven = points.targets(frames[batch])

@@ -31,8 +31,8 @@ _DRAGGED_COUNT = 0.1
 _DRAGGED = frozenset({14, 16, 17, 18, 39, 40, 41, 42, 61, 62, 63})
 _REGION_OF_GROUP = {2: "mouth", 8: "mouth", 3: "eyes", 4: "brows", 5: "cheeks", 9: "nose"}
 
-# A smile lifts the cheeks (AU 6 comes with AU 12), which no PEP can say. Where the cheek's FAP is 0, its point is asked
-# to go up with the corner of the mouth: cheek FAP, corner FAP, share of the corner's distance.
+# A smile lifts the cheeks (AU 6 comes with AU 12), which no PEP can say. The cheek's point is asked to go up with the
+# corner of the mouth at least so far: cheek FAP, corner FAP, share of the corner's distance.
 _LIFTED_CHEEKS = ((41, 12), (42, 13))
 _LIFT = 0.6
 _LIFT_COUNT = 0.4
@@ -65,6 +65,9 @@ CORNERS = ("2.4", "2.5", "8.3", "8.4")
 _DEEP = (*CORNERS, "2.1")
 _DEPTH_COUNT = 0.2
 
+_FAINT = 0.001
+"""Distance in dm, a tenth of a millimetre, at which a FAP begins to count as moving."""
+
 _STEPS = 600
 _RELAXATION = 1.6
 
@@ -74,8 +77,9 @@ def moving_faps() -> tuple[Fap, ...]:
     return tuple(
         fap
         for fap in faps().values()
-        if fap.direction is not None and fap.group != 10 and all(point in VERTICES for point in fap.points)
-        if not fap.name.count("tongue")
+        if fap.direction is not None
+        and fap.group in _REGION_OF_GROUP
+        and all(point in VERTICES for point in fap.points)
     )
 
 
@@ -133,8 +137,8 @@ class MorphSolver:
             How much each control point is driven, 0 to 1.
         """
         distances = sequence[:, self._columns] * self._steps
-        still = distances[:, self._cheeks] == 0.0
-        distances[:, self._cheeks] += still * _LIFT * np.maximum(distances[:, self._corners], 0.0)
+        lift = _LIFT * np.maximum(distances[:, self._corners], 0.0)
+        distances[:, self._cheeks] = np.maximum(distances[:, self._cheeks], lift)
         counts = np.hstack(
             [
                 self._counts(distances),
@@ -150,11 +154,11 @@ class MorphSolver:
     def _counts(self, distances: Floats) -> Floats:
         """Return how much each FAP counts in each frame: (T, F).
 
-        A FAP counts as moving by its share in the mean square of its region. This does not depend on how far the whole
+        A FAP counts as moving by its share in the mean square of its region. This hardly depends on how far the whole
         region goes, so half the values give half the weights, and an expression grows along a straight line.
         """
         squares = distances**2
-        moving: Floats = squares / np.maximum(squares + squares @ self._same_region.T, 1e-30)
+        moving: Floats = squares / (squares + squares @ self._same_region.T + _FAINT**2)
         counts: Floats = self._staying_count + (self._moving_count - self._staying_count) * moving
         return counts
 

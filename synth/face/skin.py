@@ -170,8 +170,9 @@ def _behind_eyes(face: FaceModel, vertices: Floats) -> NDArray[np.bool_]:
 def _follow(face: FaceModel, vertices: Floats) -> Floats:
     """Weigh the neck's share by height above its root, the skull's share by distance above the jaw's underside."""
     neck, skull, jaw = (face.pivots[name] for name in ("neck", "head", "jaw"))
-    root, top = neck[1] - 0.05, skull[1] - 0.25
-    bend = step(vertices[:, 1], root - 0.15, top)
+    # The collar and the shoulders stay; what hardly moves need not be drawn anew either.
+    root, top = neck[1] + 0.10, skull[1] - 0.25
+    bend = step(vertices[:, 1], root, top) * (1 - step(np.abs(vertices[:, 0]), 0.5, 0.85))
     # The border between skull and neck runs from below the chin obliquely up to the nape.
     chin_floor = jaw[1] - 0.16
     border = chin_floor + (skull[1] - 0.05 - chin_floor) * np.clip((0.75 - vertices[:, 2]) / 0.85, 0, 1)
