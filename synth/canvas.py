@@ -195,6 +195,9 @@ class Canvas:
         x, y, w = (
             row[0] * columns[0] + row[1] * columns[1] + row[2] * columns[2] + row[3] for row in self._camera[[0, 1, 3]]
         )
+        if w.min() <= 0.0:
+            # What passes behind the camera has no place in the picture.
+            return (0, 0, *self._size)
         box = []
         for places, size in ((x / w, self._size[0]), (y / w, self._size[1])):
             ends = 0.5 * size * (np.array([places.min(), places.max()]) + 1)

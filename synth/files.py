@@ -1,5 +1,6 @@
 """Files that appear complete or not at all."""
 
+import contextlib
 import secrets
 from pathlib import Path
 
@@ -21,11 +22,17 @@ def write_whole(path: Path, content: bytes | str) -> None:
     VideoError
         If it cannot be written; then nothing is left behind, and an older file is untouched.
     """
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
+    partial = partial_name(path)
     try:
         partial.write_bytes(content if isinstance(content, bytes) else content.encode("utf-8"))
         partial.replace(path)
     except OSError as error:
         raise VideoError(f"The file {path} could not be written: {error.strerror or error}.") from error
     finally:
-        partial.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def partial_name(path: Path) -> Path:
+    """Return a name of its own beside ``path`` for what is not complete yet."""
+    return path.with_name(f".{secrets.token_hex(8)}.part")

@@ -1,4 +1,7 @@
-"""Rendering: frames of a face, without a display. The only module that knows pyrender and OpenGL."""
+"""Rendering: frames of a face, without a display.
+
+Only this module, `synth.canvas` and `synth.baseline` know pyrender and OpenGL.
+"""
 
 import ctypes
 import functools
@@ -133,7 +136,9 @@ class Renderer:
                 picture = canvas.picture(pose, following)
             if following is not None:
                 pose = following
-            yield from itertools.repeat(picture, end - start)
+            yield picture
+            for _ in range(start + 1, end):
+                yield picture.copy()
 
     def timed_frame(self, motion: Motion, frame: int = 0) -> tuple[NDArray[np.uint8], StageTimes]:
         """Draw one frame as `frame` does, waiting for the end of each stage, and say how long they took."""
@@ -163,7 +168,11 @@ class Renderer:
         self.close()
 
     def _pose(self, motion: Motion, frame: int) -> NDArray[np.float32]:
-        return np.hstack(self._rig.pose(motion, frame)).astype(np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            pose = np.hstack(self._rig.pose(motion, frame)).astype(np.float32)
+        if not np.isfinite(pose).all():
+            raise SpecError(f"Motion: frame {frame} takes the figure beyond all bounds; weights are usually 0 to 1.")
+        return pose
 
     @contextmanager
     def _open(self) -> Iterator[Canvas]:
@@ -174,9 +183,15 @@ class Renderer:
             yield self._canvas
 
 
+_unused: list[Canvas] = []
+"""Canvases of renderers that are gone: freed when nobody draws."""
+
+
 def _delete(canvas: Canvas) -> None:
+    _unused.append(canvas)
+    # The collector may free a renderer in the midst of another one's drawing; that one then frees the canvas.
     with current_graphics():
-        canvas.delete()
+        pass
 
 
 def camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64], float]:
@@ -204,12 +219,15 @@ def current_graphics() -> Iterator["_Graphics"]:
                 yield graphics
             finally:
                 graphics.users -= 1
-                # The collector may free a renderer in the midst of another one's drawing, which must keep the context.
                 if not graphics.users:
+                    while _unused:
+                        _unused.pop().delete()
                     graphics.release()
         except graphics.failures as error:
-            what = str(error).strip().splitlines()
-            raise RenderError(f"OpenGL failed while drawing ({what[0] if what else type(error).__name__}).") from error
+            what = getattr(error, "description", None) or getattr(error, "err", None) or type(error).__name__
+            if isinstance(what, bytes):
+                what = what.decode("ascii", "replace")
+            raise RenderError(f"OpenGL failed while drawing ({what}).") from error
 
 
 @functools.cache

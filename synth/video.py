@@ -1,7 +1,6 @@
 """Video: frames to an MP4 file that plays in each browser, and single pictures to PNG files."""
 
 import contextlib
-import secrets
 import subprocess
 import wave
 from pathlib import Path
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError, VideoError
-from synth.files import write_whole
+from synth.files import partial_name, write_whole
 
 _MAX_RATE = 240
 _TAGS = "setparams=color_primaries=bt709:color_trc=bt709"
@@ -57,7 +56,7 @@ class VideoWriter:
         self.path, self.width, self.height = path, width, height
         self._fps, self._audio = fps, audio
         self._count = 0
-        self._partial = _partial_name(path)
+        self._partial = partial_name(path)
         self._done = False
         try:
             self._ffmpeg = subprocess.Popen(  # noqa: S603 - a fixed program, no shell
@@ -65,6 +64,8 @@ class VideoWriter:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
+                # A signal to the terminal's group is ours to answer.
+                start_new_session=True,
             )
         except (OSError, RuntimeError) as error:
             raise VideoError(f"ffmpeg could not be started for {path} ({error}); reinstall imageio-ffmpeg.") from error
@@ -134,7 +135,7 @@ class VideoWriter:
 
     def _add_sound(self, audio: Path) -> None:
         """Put the sound beside the finished pictures, whose duration is known only now."""
-        silent = _partial_name(self.path)
+        silent = partial_name(self.path)
         self._partial.replace(silent)
         try:
             done = subprocess.run(  # noqa: S603 - a fixed program, no shell
@@ -205,10 +206,6 @@ def _check_sound(audio: Path) -> None:
         raise VideoError(f"The sound {audio} holds no samples; leave it out for a silent film.")
     if audio.stat().st_size < promised:
         raise VideoError(f"The sound {audio} is cut off: it promises {promised} bytes of samples; copy it again.")
-
-
-def _partial_name(path: Path) -> Path:
-    return path.with_name(f".{path.name}.{secrets.token_hex(6)}.part")
 
 
 def _command(path: Path, width: int, height: int, fps: float) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.expression.pep import PEP_COUNT, check_peps, peps
-from synth.fap.table import FAP_COUNT, column
+from synth.fap.table import FAP_COUNT, column, faps
 
 Floats = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ def pep_to_fap(values: NDArray[np.floating] | Floats) -> Floats:
     array = check_peps(values)
     plus, minus = _maxima()
     # Each FAP belongs to at most one PEP, so the sum over PEPs only places the values in their columns.
-    faps: Floats = np.maximum(array, 0.0) @ plus + np.maximum(-array, 0.0) @ minus
-    return faps + 0.0
+    result: Floats = np.maximum(array, 0.0) @ plus + np.maximum(-array, 0.0) @ minus
+    return result + 0.0
 
 
 @cache
@@ -59,6 +59,8 @@ def _maxima() -> tuple[Floats, Floats]:
     for k, (pep, row) in enumerate(zip(peps(), _rows(), strict=True)):
         shares = {pep.key: 1.0} | {int(fap): share for fap, share in row["shares"].items()}
         for fap, share in shares.items():
-            plus[k, column(fap)] = share * row["plus"]
-            minus[k, column(fap)] = share * row["minus"]
+            for values, maximum in ((plus, row["plus"]), (minus, row["minus"])):
+                # A jaw that is closed cannot close further, nor may its FAP say so.
+                two_way = faps()[fap].two_way
+                values[k, column(fap)] = share * maximum if two_way else max(share * maximum, 0.0)
     return plus, minus

@@ -8,6 +8,7 @@ standard says; a point whose FAPs are all 0 goes along with its neighbours, as f
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from synth.face.eyes import pupil_diameter
 from synth.face.landing import Landing
@@ -68,11 +69,13 @@ def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     # Clips hold still for long: each different frame is solved once.
     frames, first, place = np.unique(sequence, axis=0, return_index=True, return_inverse=True)
     own_weights, own_residual = weights[first], np.zeros((len(frames), len(rig.control.names), 3))
-    for start in range(0, len(frames), _BATCH):
-        batch = slice(start, start + _BATCH)
-        targets, driven = points.targets(frames[batch])
-        own_weights[batch, morphs.morphs] = morphs.solve(frames[batch], driven)
-        own_residual[batch] = points.remaining(targets, driven, own_weights[batch])
+    # The matrices are small: threads would only wait for each other, and take the cores from those who draw.
+    with threadpool_limits(1, user_api="blas"):
+        for start in range(0, len(frames), _BATCH):
+            batch = slice(start, start + _BATCH)
+            targets, driven = points.targets(frames[batch])
+            own_weights[batch, morphs.morphs] = morphs.solve(frames[batch], driven)
+            own_residual[batch] = points.remaining(targets, driven, own_weights[batch])
     pupil = pupil_diameter(face)
     return Motion(
         weights=own_weights[place.reshape(-1)],

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from synth.errors import SpecError
 from synth.face.appearance import dress
 from synth.face.eyes import EYES, pupil_growth
 from synth.face.feature_points import HAIR_TOP, SKULL_TOP, VERTICES, feature_points, skin_rows
@@ -18,6 +19,8 @@ Floats = NDArray[np.float64]
 
 _NEAR_CROWN = 0.15
 """How far from the top of the skull the top of the hair is looked for; dm."""
+
+_NO_TURN = 1e-12
 
 NECK_SHARE = 0.4
 """Part of the head's rotation that happens along the neck; the rest happens at the base of the skull."""
@@ -102,9 +105,22 @@ class Rig:
         return points
 
     def pose(self, motion: Motion, frame: int = 0) -> tuple[Floats, Floats]:
-        """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion."""
+        """Return positions (N, 3) in dm and unit normals (N, 3) of one frame of a motion.
+
+        Raises
+        ------
+        SpecError
+            If the motion has no such frame, or its residual is not one of this rig's control points.
+        """
+        points = motion.residual.shape[1]
+        if not 0 <= frame < len(motion):
+            raise SpecError(f"Motion: there is no frame {frame}; it has {len(motion)}, counted from 0.")
+        if points not in {0, len(self.control.names)}:
+            raise SpecError(
+                f"Motion: the residual has {points} points; it must have {len(self.control.names)}, or none."
+            )
         positions = self._rest + (self._morphs @ motion.weights[frame]).reshape(-1, 3)
-        if motion.residual.shape[1]:
+        if points:
             positions += self.control.basis @ motion.residual[frame]
         for eye, name in enumerate(EYES):
             span, centre = self.spans[name], self.face.eye_centres[eye]
@@ -138,7 +154,8 @@ class _Turns:
 
     def apply(self, positions: Floats, head: Floats) -> Floats:
         """Return the positions (N, 3) after a rotation of the head by pitch, yaw and roll (3,)."""
-        if not head.any():
+        # Angles far below what is seen would end in a division by 0.
+        if np.abs(head).max() < _NO_TURN:
             return positions
         pitch, yaw, roll = head
         turn = Rotation.from_euler("YXZ", [yaw, pitch, roll]).as_rotvec()

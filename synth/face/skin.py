@@ -172,7 +172,7 @@ def _follow(face: FaceModel, vertices: Floats) -> Floats:
     neck, skull, jaw = (face.pivots[name] for name in ("neck", "head", "jaw"))
     # The collar and the shoulders stay; what hardly moves need not be drawn anew either.
     root, top = neck[1] + 0.10, skull[1] - 0.25
-    bend = step(vertices[:, 1], root, top) * (1 - step(np.abs(vertices[:, 0]), 0.5, 0.85))
+    bend = step(vertices[:, 1], root, top)
     # The border between skull and neck runs from below the chin obliquely up to the nape.
     chin_floor = jaw[1] - 0.16
     border = chin_floor + (skull[1] - 0.05 - chin_floor) * np.clip((0.75 - vertices[:, 2]) / 0.85, 0, 1)
