@@ -3,11 +3,13 @@
 Only this module, `synth.canvas` and `synth.baseline` know pyrender and OpenGL.
 """
 
+import contextlib
 import ctypes
 import functools
 import importlib
 import itertools
 import os
+import queue
 import sys
 import threading
 import time
@@ -31,6 +33,12 @@ RENDERER_VERSION = "2"
 """Part of a clip's identity; raise it when pictures change."""
 
 MIN_SIZE, MAX_SIZE = 16, 4096
+
+LANES = 2
+"""Graphics contexts of a process: they draw a film's frames in turn, so that no core waits for the other's."""
+
+_FILM = 8
+"""Different frames from which on a second context is worth its start."""
 
 _ADVICE = {
     "egl": "run `apt-get install --reinstall libegl1 libgl1 libgl1-mesa-dri`",
@@ -89,18 +97,11 @@ class Renderer:
                 raise SpecError(f"The frame's {name} is {size}; it must be from {MIN_SIZE} to {MAX_SIZE} pixels.")
         self.width, self.height = width, height
         self._rig = rig
+        self._free: list[weakref.finalize[..., Renderer]] = []
         self._closed = False
-        with current_graphics() as graphics:
-            at, field_of_view = camera(rig.face, width, height)
-            self._canvas = Canvas(
-                *(graphics.gl, graphics.pyrender, rig),
-                camera_at=at,
-                field_of_view=field_of_view,
-                width=width,
-                height=height,
-            )
-            # Also at the interpreter's end, while OpenGL still works.
-            self._free = weakref.finalize(self, _delete, self._canvas)
+        self._canvases: dict[int, Canvas] = {}
+        with self._open(0):
+            pass
 
     def frame(self, motion: Motion, frame: int = 0) -> NDArray[np.uint8]:
         """Draw one frame of a motion.
@@ -116,36 +117,46 @@ class Renderer:
             If the renderer is closed, or OpenGL fails.
         """
         pose = self._pose(motion, frame)
-        with self._open() as canvas:
+        with self._open(0) as canvas:
             return canvas.picture(pose)
 
     def frames(self, motion: Motion) -> Iterator[NDArray[np.uint8]]:
         """Draw all frames of a motion, one after the other; a pose that does not change is drawn once.
 
-        While one frame is rasterised the next one is posed, and while the caller has one the next one is rasterised.
+        While one frame is rasterised the next one is posed, and while the caller has one the next ones are rasterised.
+        At most three frames for each of the `LANES` are on their way.
         """
         starts = np.flatnonzero(motion.changes()).tolist()
-        if not starts:
-            return
-        pose = self._pose(motion, 0)
-        with self._open() as canvas:
-            canvas.show(pose)
-        for start, end in itertools.pairwise([*starts, len(motion)]):
-            following = self._pose(motion, end) if end < len(motion) else None
-            with self._open() as canvas:
-                picture = canvas.picture(pose, following)
-            if following is not None:
-                pose = following
+        lanes = LANES if len(starts) >= _FILM and many_contexts() else 1
+        work = [_Lane(self._drawn(motion, starts[lane::lanes], lane)) for lane in range(lanes)]
+        try:
+            for k, (start, end) in enumerate(itertools.pairwise([*starts, len(motion)])):
+                picture = work[k % lanes].next()
+                yield picture
+                for _ in range(start + 1, end):
+                    yield picture.copy()
+        finally:
+            for lane in work:
+                lane.stop()
+
+    def _drawn(self, motion: Motion, frames: list[int], lane: int) -> Iterator[NDArray[np.uint8]]:
+        """Draw some frames of a motion in one context; each is posed while the one before is rasterised."""
+        pose = self._pose(motion, frames[0]) if frames else None
+        for following in [*frames[1:], None]:
+            if pose is None:
+                return
+            after = None if following is None else self._pose(motion, following)
+            with self._open(lane) as canvas:
+                picture = canvas.picture(pose, after)
             yield picture
-            for _ in range(start + 1, end):
-                yield picture.copy()
+            pose = after
 
     def timed_frame(self, motion: Motion, frame: int = 0) -> tuple[NDArray[np.uint8], StageTimes]:
         """Draw one frame as `frame` does, waiting for the end of each stage, and say how long they took."""
         times = [time.perf_counter()]
         pose = self._pose(motion, frame)
         times.append(time.perf_counter())
-        with self._open() as canvas:
+        with self._open(0) as canvas:
             for step in (functools.partial(canvas.upload, pose), canvas.draw):
                 step()
                 canvas.finish()
@@ -155,9 +166,10 @@ class Renderer:
         return picture, StageTimes(*np.diff(times).tolist())
 
     def close(self) -> None:
-        """Free what the graphics context holds for this renderer; a second call does nothing."""
-        self._free()
+        """Free what the graphics contexts hold for this renderer; a second call does nothing."""
         self._closed = True
+        for free in self._free:
+            free()
 
     def __enter__(self) -> Self:
         return self
@@ -175,22 +187,67 @@ class Renderer:
         return pose
 
     @contextmanager
-    def _open(self) -> Iterator[Canvas]:
-        """Lend the canvas to this thread alone."""
-        with current_graphics():
+    def _open(self, lane: int) -> Iterator[Canvas]:
+        """Lend the canvas of a lane to this thread alone; it is made when it is first needed."""
+        with current_graphics(lane) as graphics:
             if self._closed:
                 raise RenderError("The renderer is closed; make a new one.")
-            yield self._canvas
+            if lane not in self._canvases:
+                at, field_of_view = camera(self._rig.face, self.width, self.height)
+                self._canvases[lane] = canvas = Canvas(
+                    *(graphics.gl, graphics.pyrender, self._rig),
+                    camera_at=at,
+                    field_of_view=field_of_view,
+                    width=self.width,
+                    height=self.height,
+                )
+                # Also at the interpreter's end, while OpenGL still works.
+                self._free.append(weakref.finalize(self, _delete, canvas, lane))
+            yield self._canvases[lane]
 
 
-_unused: list[Canvas] = []
-"""Canvases of renderers that are gone: freed when nobody draws."""
+class _Lane:
+    """A thread that draws ahead, a little."""
+
+    def __init__(self, pictures: Iterator[NDArray[np.uint8]]) -> None:
+        self._ready: queue.Queue[NDArray[np.uint8] | BaseException] = queue.Queue(maxsize=1)
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, args=(pictures,), name="padlab-lane", daemon=True)
+        self._thread.start()
+
+    def _run(self, pictures: Iterator[NDArray[np.uint8]]) -> None:
+        try:
+            for picture in pictures:
+                self._ready.put(picture)
+                if self._stopped:
+                    return
+        except BaseException as error:
+            self._ready.put(error)
+
+    def next(self) -> NDArray[np.uint8]:
+        """Return the next picture, or raise what went wrong."""
+        found = self._ready.get()
+        if isinstance(found, BaseException):
+            raise found
+        return found
+
+    def stop(self) -> None:
+        """End the thread, whatever it still has."""
+        self._stopped = True
+        while self._thread.is_alive():
+            with contextlib.suppress(queue.Empty):
+                self._ready.get_nowait()
+            self._thread.join(timeout=0.01)
 
 
-def _delete(canvas: Canvas) -> None:
-    _unused.append(canvas)
+_unused: tuple[list[Canvas], ...] = tuple([] for _ in range(LANES))
+"""Canvases of renderers that are gone, by lane: freed when nobody draws there."""
+
+
+def _delete(canvas: Canvas, lane: int) -> None:
+    _unused[lane].append(canvas)
     # The collector may free a renderer in the midst of another one's drawing; that one then frees the canvas.
-    with current_graphics():
+    with current_graphics(lane):
         pass
 
 
@@ -204,14 +261,14 @@ def camera(face: FaceModel, width: int, height: int) -> tuple[NDArray[np.float64
     return np.array([0.0, centre, distance + 1.0]), float(_FIELD_OF_VIEW)
 
 
-_lock = threading.RLock()
+_locks = tuple(threading.RLock() for _ in range(LANES))
 
 
 @contextmanager
-def current_graphics() -> Iterator["_Graphics"]:
-    """Make the process's graphics context current in this thread, and let it go afterwards."""
-    with _lock:
-        graphics = _graphics()
+def current_graphics(lane: int = 0) -> Iterator["_Graphics"]:
+    """Make one of the process's graphics contexts current in this thread, and let it go afterwards."""
+    with _locks[lane]:
+        graphics = _graphics(lane)
         try:
             graphics.platform.make_current()
             graphics.users += 1
@@ -220,8 +277,8 @@ def current_graphics() -> Iterator["_Graphics"]:
             finally:
                 graphics.users -= 1
                 if not graphics.users:
-                    while _unused:
-                        _unused.pop().delete()
+                    while _unused[lane]:
+                        _unused[lane].pop().delete()
                     graphics.release()
         except graphics.failures as error:
             what = getattr(error, "description", None) or getattr(error, "err", None) or type(error).__name__
@@ -231,8 +288,17 @@ def current_graphics() -> Iterator["_Graphics"]:
 
 
 @functools.cache
-def _graphics() -> "_Graphics":
-    return _Graphics()
+def _graphics(_lane: int) -> "_Graphics":
+    with _starting:
+        return _Graphics()
+
+
+_starting = threading.Lock()
+
+
+def many_contexts() -> bool:
+    """Tell whether this machine's way to OpenGL is known to bear several contexts in one process."""
+    return _choose_platform() == "egl"
 
 
 def _loads(*libraries: str) -> bool:

@@ -2,7 +2,6 @@
 
 import contextlib
 import subprocess
-import wave
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -16,6 +15,7 @@ from synth.errors import SpecError, VideoError
 from synth.files import partial_name, write_whole
 
 _MAX_RATE = 240
+_LAYOUT = "aformat=channel_layouts=mono|stereo"
 _TAGS = "setparams=color_primaries=bt709:color_trc=bt709"
 
 
@@ -193,19 +193,26 @@ def _check(frame: NDArray[Any], shape: tuple[int, int, int] | None) -> None:
 
 
 def _check_sound(audio: Path) -> None:
+    """Let ffmpeg decode the sound once, before any picture is drawn."""
     try:
-        with wave.open(str(audio), "rb") as sound:
-            samples = sound.getnframes()
-            promised = samples * sound.getnchannels() * sound.getsampwidth()
+        with audio.open("rb") as file:
+            head = file.read(12)
     except OSError as error:
         raise VideoError(f"The sound {audio} could not be read: {error.strerror or error}.") from error
-    except (wave.Error, EOFError) as error:
-        reason = str(error) or "it ends too early"
-        raise VideoError(f"The sound {audio} is not a plain WAV file ({reason}); it must be 16-bit PCM.") from error
-    if not samples:
+    if head[:4] not in {b"RIFF", b"RF64"} or head[8:] != b"WAVE":
+        raise VideoError(f"The sound {audio} is not a WAV file; convert it to one.")
+    decode = [*_sound_input(audio), "-af", _LAYOUT, "-ar", "8000", "-f", "s16le", "pipe:1"]
+    done = subprocess.run(  # noqa: S603 - a fixed program, no shell
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", *decode], capture_output=True, check=False
+    )
+    if done.returncode != 0:
+        raise VideoError(f"The sound {audio} could not be decoded; convert it to a WAV file with 16-bit PCM samples.")
+    if not done.stdout:
         raise VideoError(f"The sound {audio} holds no samples; leave it out for a silent film.")
-    if audio.stat().st_size < promised:
-        raise VideoError(f"The sound {audio} is cut off: it promises {promised} bytes of samples; copy it again.")
+
+
+def _sound_input(audio: Path) -> list[str]:
+    return ["-f", "wav", "-i", f"file:{audio}"]
 
 
 def _command(path: Path, width: int, height: int, fps: float) -> list[str]:
@@ -227,8 +234,8 @@ def _sound_command(silent: Path, audio: Path, path: Path, seconds: float) -> lis
     """Compose the call that copies the pictures and encodes the sound, padded or cut to their duration."""
     return [
         *(imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-nostdin", "-y"),
-        *("-i", f"file:{silent}", "-f", "wav", "-i", f"file:{audio}", "-map", "0:v", "-map", "1:a"),
-        *("-c:v", "copy", "-af", f"apad,atrim=duration={seconds:.6f}", "-c:a", "aac", "-b:a", "128k"),
+        *("-i", f"file:{silent}", *_sound_input(audio), "-map", "0:v", "-map", "1:a"),
+        *("-c:v", "copy", "-af", f"{_LAYOUT},apad,atrim=duration={seconds:.6f}", "-c:a", "aac", "-b:a", "128k"),
         *("-flags:a", "+bitexact", "-threads", "1"),
         *_container(path),
     ]

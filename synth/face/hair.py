@@ -16,8 +16,8 @@ from synth.face.wrapping import place_strand, step
 
 Floats = NDArray[np.float64]
 
-_COLUMNS, _HEAD_ROWS, _FALL_ROWS = 47, 9, 9
-_LINING_ROWS = _FALL_ROWS + 2
+_COLUMNS, _HEAD_ROWS, _FALL_ROWS = 37, 8, 8
+_LINING_ROWS = _FALL_ROWS + 5
 """Rows of the bob's dark inner side; further up the scalp is close behind the bob."""
 _LINING_GAP = 0.014
 """How far the lining lies within the bob, dm."""

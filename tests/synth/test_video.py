@@ -55,6 +55,20 @@ def test_rate_and_format(tmp_path: Path) -> None:
     assert found["pix_fmt"].startswith("yuv420p")
 
 
+def test_films_say_what_their_colours_mean(tmp_path: Path) -> None:
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-hide_banner", "-i", str(write(tmp_path / "a.mp4"))]
+    said = subprocess.run(command, capture_output=True, text=True, check=False).stderr
+    assert "yuv420p(tv, bt709," in said, "matrix, primaries and transfer alike"
+
+
+@pytest.mark.parametrize("codec", ["pcm_u8", "pcm_s24le", "pcm_f32le"])
+def test_any_wav_will_do(tmp_path: Path, codec: str) -> None:
+    plain, other = beep(tmp_path / "a.wav", 0.5), tmp_path / "b.wav"
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-v", "error", "-i", str(plain), "-ac", "6", "-c:a", codec, str(other)]
+    subprocess.run(command, check=True)
+    assert loudness(heard(write(tmp_path / "a.mp4", audio=other))[1000:5000]) > 0.05
+
+
 def beep(path: Path, seconds: float, *, rate: int = 22050, at: float = 0.0) -> Path:
     """A WAV file: silence, and from ``at`` on a tone of 440 Hz."""
     time = np.arange(round(seconds * rate)) / rate

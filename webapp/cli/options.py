@@ -1,6 +1,9 @@
 """What the commands that make faces share: sizes, files to write, face data."""
 
 import re
+import signal
+import sys
+import tempfile
 from pathlib import Path
 
 import click
@@ -50,14 +53,29 @@ def check_out(out: Path | None, *suffixes: str, option: str = "--out") -> None:
     click.BadParameter
         If the name ends otherwise.
     ConfigError
-        If the folder does not exist.
+        If the folder does not exist or cannot be written to.
     """
     if out is None:
         return
     if out.suffix.lower() not in suffixes:
         raise click.BadParameter(f"'{out}' must end with {' or '.join(suffixes)}", param_hint=option)
-    if not out.resolve().parent.is_dir():
-        raise ConfigError(f"The folder {out.resolve().parent} does not exist; make it, or name another with {option}")
+    folder = out.resolve().parent
+    if not folder.is_dir():
+        raise ConfigError(f"The folder {folder} does not exist; make it, or name another with {option}")
+    try:
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise ConfigError(
+            f"The folder {folder} cannot be written to ({error.strerror or error}); name another with {option}"
+        ) from error
+    _end_on_signals()
+
+
+def _end_on_signals() -> None:
+    """Let a closed terminal or a stopped service end the command as Ctrl-C does: with nothing half-written left."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda which, _frame: sys.exit(128 + which))
 
 
 def face_dir() -> Path:

@@ -267,3 +267,26 @@ def test_eye_angles_and_lids_that_follow(face, rig):
 def test_sequences_are_checked(face, rig):
     with pytest.raises(SpecError, match=r"\(frames, 68\)"):
         solve(np.zeros(68), rig)
+
+
+@pytest.mark.parametrize("identity", sorted(IDENTITIES))
+def test_expressions_grow_without_jumps(face_dir, identity):
+    """Also where lips begin to touch: the longest step of any point is hardly longer than the usual one."""
+    rig = Rig(load_face(face_dir, identity))
+    _, _, peps = word_table()
+    for pep in peps:
+        motion = solve(np.linspace(0.0, 1.5, 61)[:, None] * pep_to_fap(pep[None]), rig)
+        places = np.array([rig.pose(motion, frame)[0][rig.control.rows] for frame in range(len(motion))])
+        steps = np.linalg.norm(np.diff(places, axis=0), axis=2).max(axis=1)
+        assert steps.max() < 2 * np.median(steps)
+
+
+@pytest.mark.parametrize("fap", [12, 19, 41, 51])
+def test_values_leave_zero_smoothly(rig, fap):
+    smile = pep_to_fap(word_table()[2][:1])
+    smile[0, [column(25), column(26)]] = 25_000
+    places = []
+    for value in (0.0, 1e-6):
+        smile[0, column(fap)] = value
+        places.append(rig.pose(solve(smile, rig))[0])
+    assert np.abs(places[1] - places[0]).max() < 1e-4

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from synth.errors import SpecError
 from synth.face.motion import Motion
 from synth.face.rig import Rig
 
@@ -78,3 +79,17 @@ def test_a_pupil_grows_on_its_ball(rig: Rig) -> None:
     assert 0.005 < np.linalg.norm(way[rig.spans["left-eye"]], axis=1).max() < 0.03
     way[rig.spans["left-eye"]] = 0.0
     assert not way.any()
+
+
+@pytest.mark.parametrize("turn", [1e-320, 1e-170, 1e-100, 1e-13])
+def test_a_turn_too_small_to_see_changes_nothing(rig: Rig, turn: float) -> None:
+    np.testing.assert_allclose(_posed(rig, head=(turn, 0, 0)), _posed(rig), atol=1e-9)
+
+
+def test_motions_of_other_figures_are_refused(rig: Rig) -> None:
+    still = Motion.of()
+    other = Motion(still.weights, still.head, still.eyes, still.thrust, still.pupils, np.zeros((1, 5, 3)))
+    with pytest.raises(SpecError, match="residual has 5 points; it must have 43"):
+        rig.pose(other)
+    with pytest.raises(SpecError, match="no frame 3; it has 1"):
+        rig.pose(still, 3)
