@@ -22,6 +22,9 @@ _NEAR_CROWN = 0.15
 
 _NO_TURN = 1e-12
 
+_LID_REACH, _LID_FILM = 1.6, 0.02
+"""How far from an eyeball skin counts as its lids, and how far these stay off it, in parts of the ball's radius."""
+
 NECK_SHARE = 0.4
 """Part of the head's rotation that happens along the neck; the rest happens at the base of the skull."""
 
@@ -91,6 +94,7 @@ class Rig:
         self._around = sparse.csr_array(around).astype(np.float32)
         self.follow = np.concatenate([surface.follow for surface in surfaces])
         self._pupil_growth = pupil_growth(face)
+        self._lids = [self._before_ball(eye) for eye in range(len(EYES))]
         self._turns = _Turns(self.follow, face.pivots["neck"], face.pivots["head"])
 
     def feature_points(self) -> dict[str, Floats]:
@@ -122,6 +126,8 @@ class Rig:
         positions = self._rest + (self._morphs @ motion.weights[frame]).reshape(-1, 3)
         if points:
             positions += self.control.basis @ motion.residual[frame]
+        for eye in range(len(EYES)):
+            self._keep_off(positions, eye, motion.thrust[frame, eye])
         for eye, name in enumerate(EYES):
             span, centre = self.spans[name], self.face.eye_centres[eye]
             turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
@@ -129,6 +135,28 @@ class Rig:
             positions[span] = _times(ball, turn) + centre + (0, 0, motion.thrust[frame, eye])
         positions = self._turns.apply(positions, motion.head[frame])
         return positions, self._normals(positions)
+
+    def _before_ball(self, eye: int) -> tuple[NDArray[np.int64], Floats]:
+        """Return the rows of skin and lashes round the front of an eyeball, and how near its centre they may come."""
+        centre = self.face.eye_centres[eye]
+        ball = np.linalg.norm(self._rest[self.spans[EYES[eye]]] - centre, axis=1).max()
+        soft = np.zeros(len(self._rest), dtype=bool)
+        for name in ("skin", "left-lashes", "right-lashes"):
+            soft[self.spans[name]] = True
+        arms = self._rest - centre
+        distance = np.linalg.norm(arms, axis=1)
+        rows = np.flatnonzero(soft & (arms[:, 2] > 0) & (distance > ball) & (distance < _LID_REACH * ball))
+        return rows, np.minimum(distance[rows], (1.0 + _LID_FILM) * ball)
+
+    def _keep_off(self, positions: Floats, eye: int, thrust: float) -> None:
+        """Push lids off the eyeball, in place: bumps move them along straight lines, which may lead through it."""
+        rows, nearest = self._lids[eye]
+        arms = positions[rows] - self.face.eye_centres[eye] - (0, 0, thrust)
+        distance = np.sqrt(np.einsum("ij,ij->i", arms, arms))
+        inside = distance < nearest
+        if inside.any():
+            arms, distance, nearest = arms[inside], distance[inside], nearest[inside]
+            positions[rows[inside]] += arms * (nearest / np.maximum(distance, 1e-6) - 1.0)[:, None]
 
     def _normals(self, positions: Floats) -> Floats:
         """Average the faces' area-weighted normals at each vertex."""

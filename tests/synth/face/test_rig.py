@@ -2,8 +2,12 @@ import numpy as np
 import pytest
 
 from synth.errors import SpecError
+from synth.face.deformation import solve
+from synth.face.identity import IDENTITIES
+from synth.face.mesh import load_face
 from synth.face.motion import Motion
 from synth.face.rig import Rig
+from synth.fap.table import column
 
 
 def _posed(rig: Rig, **pose: object) -> np.ndarray:
@@ -93,3 +97,21 @@ def test_motions_of_other_figures_are_refused(rig: Rig) -> None:
         rig.pose(other)
     with pytest.raises(SpecError, match="no frame 3; it has 1"):
         rig.pose(still, 3)
+
+
+@pytest.mark.parametrize("identity", sorted(IDENTITIES))
+def test_closing_lids_stay_off_the_ball(face_dir, identity: str) -> None:
+    """Whatever share of the way the lower lid takes."""
+    rig = Rig(load_face(face_dir, identity))
+    values = np.zeros((3, 68))
+    for frame, (upper, lower) in enumerate(((1024, 0), (512, 512), (0, 500))):
+        values[frame, [column(19), column(20)]], values[frame, [column(21), column(22)]] = upper, lower
+    motion = solve(values, rig)
+    skin, rest = rig.spans["skin"], rig.rest
+    for name, centre in zip(("left-eye", "right-eye"), rig.face.eye_centres, strict=True):
+        ball = np.linalg.norm(rest[rig.spans[name]] - centre, axis=1).max()
+        away = np.linalg.norm(rest[skin] - centre, axis=1)
+        lids = np.flatnonzero((away > 1.02 * ball) & (away < 1.5 * ball) & (rest[skin, 2] > centre[2]))
+        for frame in range(3):
+            places = rig.pose(motion, frame)[0][skin][lids]
+            assert np.linalg.norm(places - centre, axis=1).min() > ball
