@@ -6,23 +6,20 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Self
 
-import imageio_ffmpeg
 import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError
 from synth.expression.course import Course, blink_track, expression_track
 from synth.expression.pad_pep import MODEL_NAMES, load_model
-from synth.expression.pep_fap import pep_to_fap, translation_digest
-from synth.face.assets import asset_digest
+from synth.expression.pep_fap import pep_to_fap
 from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
 from synth.fap.table import FAP_COUNT, check_sequence
+from synth.lineage import digests, expression, picture_digests, versions
 from synth.pad import PAD
-from synth.render import RENDERER_VERSION
 from synth.stage import Stage
 from synth.video import write_png
 
@@ -30,8 +27,6 @@ Floats = NDArray[np.float64]
 
 LANGUAGES = ("en", "zh")
 MAX_TEXT = 1000
-FORMAT = 2
-"""Part of a clip's identity; raise it when clips change though specification, models, face and renderer stay."""
 
 _SECONDS_PER_WORD = 0.35
 _SECONDS_PER_CHARACTER = 0.25
@@ -151,7 +146,7 @@ def clip_digest(spec: ClipSpec, face_dir: Path) -> str:
     AssetError
         If the face data are missing or damaged.
     """
-    return hashlib.sha256(json.dumps(_digests(spec.model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(digests(spec.model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
 
 
 def clip_faps(spec: ClipSpec) -> Floats:
@@ -187,18 +182,19 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     stage = Stage(face_dir, spec.identity)
-    frames = stage.film(clip_faps(spec), out, fps=spec.fps, width=spec.width, height=spec.height)
+    faps = clip_faps(spec)
+    stage.film(faps, out, fps=spec.fps, width=spec.width, height=spec.height)
     pep, apex = _apex(spec.pad, spec.model, spec.intensity)
     return {
         "digest": clip_digest(spec, face_dir),
         "spec": spec.to_dict(),
         "text": spec.text,
         "seed": spec.seed,
-        "frames": frames,
-        "duration_s": frames / spec.fps,
-        **_expression(spec.pad, pep, apex),
-        "digests": _digests(spec.model, face_dir),
-        "versions": _versions(),
+        "frames": len(faps),
+        "duration_s": len(faps) / spec.fps,
+        **expression(spec.pad, pep, apex),
+        "digests": digests(spec.model, face_dir),
+        "versions": versions(),
     }
 
 
@@ -247,7 +243,7 @@ def render_faps(
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     sequence = check_sequence(values)
-    frames = Stage(face_dir, identity).film(
+    Stage(face_dir, identity).film(
         sequence, out, fps=fps, width=width, height=height, audio=audio, on_progress=on_progress
     )
     faps = hashlib.sha256(np.ascontiguousarray(sequence, dtype="<f8").tobytes()).hexdigest()
@@ -257,16 +253,14 @@ def render_faps(
         "width": width,
         "height": height,
         "fps": fps,
-        "frames": frames,
-        "duration_s": frames / fps,
+        "frames": len(sequence),
+        "duration_s": len(sequence) / fps,
         "digests": {
             "faps": faps,
             **sound,
-            "format": FORMAT,
-            "assets": asset_digest(face_dir),
-            "renderer": RENDERER_VERSION,
+            **picture_digests(face_dir),
         },
-        "versions": _versions(),
+        "versions": versions(),
     }
 
 
@@ -318,9 +312,9 @@ def render_still(
         "width": width,
         "height": height,
         "intensity": float(intensity),
-        **_expression(point, pep, apex),
-        "digests": _digests(model, face_dir),
-        "versions": _versions(),
+        **expression(point, pep, apex),
+        "digests": digests(model, face_dir),
+        "versions": versions(),
     }
 
 
@@ -368,26 +362,6 @@ def _apex(pad: tuple[float, float, float], model: str, intensity: float) -> tupl
     """Return the PEPs (9,) at full expression and their FAPs (68,)."""
     pep = intensity * load_model(model).predict(np.array([pad]))[0]
     return pep, pep_to_fap(pep[None, :])[0]
-
-
-def _digests(model: str, face_dir: Path) -> dict[str, Any]:
-    return {
-        "format": FORMAT,
-        "model": load_model(model).digest,
-        "pep_fap": translation_digest(),
-        "assets": asset_digest(face_dir),
-        "renderer": RENDERER_VERSION,
-    }
-
-
-def _expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> dict[str, Any]:
-    faps = {str(k + 1): value for k, value in enumerate(apex.tolist()) if value}
-    return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
-
-
-def _versions() -> dict[str, str]:
-    packages = {name: version(name) for name in ("padlab", "numpy", "pyrender")}
-    return packages | {"ffmpeg": imageio_ffmpeg.get_ffmpeg_version()}
 
 
 def _check_text(text: object) -> None:

@@ -73,7 +73,7 @@ class StageTimes:
 class Renderer:
     """Draw one face at one size; a context manager.
 
-    All renderers of a process share one OpenGL context and may be used from several threads. Only what has changed
+    All renderers of a process share its OpenGL contexts and may be used from several threads. Only what has changed
     since the last frame is drawn again; the result is the same, bit by bit, as if all had been.
 
     Parameters
@@ -323,7 +323,7 @@ def _choose_platform() -> str:
 
 
 class _Graphics:
-    """The process's OpenGL context, and pyrender on it."""
+    """One of the process's OpenGL contexts, and pyrender on it."""
 
     def __init__(self) -> None:
         self.users = 0

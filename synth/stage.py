@@ -79,8 +79,8 @@ class Stage:
         height: int,
         audio: Path | None = None,
         on_progress: Callable[[int, int], None] | None = None,
-    ) -> int:
-        """Write FAP values (T, 68) as an MP4 file, frame after frame, with the sound of a WAV file; return T.
+    ) -> None:
+        """Write FAP values (T, 68) as an MP4 file, frame after frame, with the sound of a WAV file.
 
         Raises
         ------
@@ -95,7 +95,6 @@ class Stage:
             for count, picture in enumerate(self.pictures(values, width=width, height=height), start=1):
                 video.write(picture)
                 tell(count, len(values))
-        return len(values)
 
 
 @lru_cache(maxsize=2)

@@ -35,7 +35,7 @@ class VideoWriter:
     fps : float
         Frames per second.
     audio : Path, optional
-        A PCM WAV file that begins with the first frame. The film lasts as long as its frames: sound that is shorter is
+        A WAV file that begins with the first frame. The film lasts as long as its frames: sound that is shorter is
         followed by silence, sound that is longer is cut.
 
     Raises

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.face.mesh import FaceModel
-from synth.face.wrapping import wrap
+from synth.face.wrapping import step, wrap
 
 Floats = NDArray[np.float64]
 
@@ -38,8 +38,7 @@ def carry_brows(face: FaceModel, template: Floats, morphs: Floats) -> None:
             -(((angle[rows, None] - angle[rows]) / _WIDTH_ANGLE) ** 2) - (from_line[rows] / _WIDTH_HEIGHT) ** 2
         )
         weight /= weight.sum(axis=1, keepdims=True)
-        t = np.clip((_BORDER - np.abs(from_line[rows])) / (_BORDER - _BAND), 0.0, 1.0)
-        share = (ends[rows] * t * t * (3 - 2 * t))[:, None]
+        share = (ends[rows] * step(_BORDER - np.abs(from_line[rows]), 0.0, _BORDER - _BAND))[:, None]
         for name in _MORPHS:
             morph = morphs[face.morph_names.index(name)]
             morph[rows] += share * (weight @ morph[rows] - morph[rows])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from synth.face.eyes import pupil_diameter
+from synth.face.eyes import PUPIL_RANGE, pupil_diameter
 from synth.face.landing import Landing
 from synth.face.morph_solver import MorphSolver
 from synth.face.motion import Motion
@@ -19,9 +19,6 @@ from synth.fap.table import check_sequence, column
 from synth.fap.units import ANGLE_UNIT, STEPS
 
 Floats = NDArray[np.float64]
-
-PUPIL_RANGE = (0.5, 1.6)
-"""Narrowest and widest pupil, as a multiple of the neutral one."""
 
 # Gaze moves the eyeballs themselves; these morphs only let the lids follow.
 _FOLLOWERS = ("eyeLookUp", "eyeLookDown", "eyeLookIn", "eyeLookOut")
@@ -35,10 +32,11 @@ _BATCH = 256
 def solve(values: NDArray[np.floating] | Floats, rig: Rig) -> Motion:
     """Find the motion that FAP values ask of a face.
 
-    Each of FAP 3 to 68 takes its feature point as far as value times FAPU, exactly, along its axis and not along the
-    others, with these limits of flesh: lips and lids that would pass through each other meet instead (a lip or lid
-    without a value of its own gives way), and closed lids overlap by a tenth of the eye's opening, so that no white is
-    seen.
+    Each of FAP 3 to 68 takes its feature point as far as value times FAPU along its axis and not along the others
+    (ISO/IEC 14496-2, Annex C), but for these limits of flesh: lips and lids that would pass through each other meet
+    instead (a lip or lid without a value of its own gives way), closed lids overlap by a tenth of the eye's opening, so
+    that no white is seen, and a displacement counts less the further it is below a tenth of a millimetre, so that
+    nothing jumps where a value leaves 0.
 
     Parameters
     ----------

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from synth.face.mesh import FaceModel
 from synth.face.palette import Palette
 from synth.face.surface import Surface, loose_surface
+from synth.face.wrapping import step
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ _LARGEST, _SMALLEST = 0.995, 0.88
 _SCLERA_FILM, _CORNEA_FILM = 0.012, 0.006
 """Radius of the ball and room below the lids, as shares of the face's eye radius."""
 
-_PUPILS = (0.5, 1.6)
+PUPIL_RANGE = (0.5, 1.6)
 """Factors of the pupil between which its growth is nearly exact."""
 
 _BLACK = np.array([0.020, 0.018, 0.018])
@@ -112,7 +113,7 @@ def eyeballs(face: FaceModel, palette: Palette) -> list[Surface]:
     up = np.sin(angle) * np.sin(turn)
     # The upper lid throws a shadow on the ball. It is the same along each parallel of the ball, so that it stays when
     # the eye looks aside; when the eye looks up or down the lid follows, and the shadow with it.
-    shade = 1.0 - 0.50 * _step(up, 0.00, 0.40) - 0.12 * _step(angle, np.radians(40), np.radians(75))
+    shade = 1.0 - 0.50 * step(up, 0.00, 0.40) - 0.12 * step(angle, np.radians(40), np.radians(75))
     gloss = np.where((angle < IRIS)[:, None], (4.0, 800.0), (0.35, 110.0))
     quads = _cap_quads(len(_RINGS), _MERIDIANS)
     still = np.zeros((len(face.morph_names), len(points), 3), dtype=np.float32)
@@ -148,8 +149,8 @@ def pupil_growth(face: FaceModel) -> Floats:
     # Depth follows the chord of the bulge between the smallest and the largest pupil.
     by_distance = np.argsort(away)
     front = by_distance[points[by_distance, 2] > 0]
-    depth = [np.interp(away + (factor - 1.0) * outward, away[front], points[front, 2]) for factor in _PUPILS]
-    chord = (depth[1] - depth[0]) / (_PUPILS[1] - _PUPILS[0])
+    depth = [np.interp(away + (factor - 1.0) * outward, away[front], points[front, 2]) for factor in PUPIL_RANGE]
+    chord = (depth[1] - depth[0]) / (PUPIL_RANGE[1] - PUPIL_RANGE[0])
     return np.column_stack([outward * np.cos(turn), outward * np.sin(turn), np.where(outward > 0, chord, 0.0)])
 
 
@@ -229,9 +230,9 @@ def _ball_colour(angle: Floats, turn: Floats, palette: Palette) -> Floats:
     fibres = 1.0 + 0.09 * np.where(depth < 0.45, inner[meridian], outer[meridian])
     # Light falls in from above and gathers in the lower half.
     bright = (1.22 - 0.30 * depth - 0.16 * np.sin(turn)) * fibres
-    iris = np.array(palette.iris) * (bright * (1 - (1 - _RIM) * _step(depth, 0.66, 0.92)))[:, None]
+    iris = np.array(palette.iris) * (bright * (1 - (1 - _RIM) * step(depth, 0.66, 0.92)))[:, None]
     white = _SCLERA * (1 + 0.012 * rng.standard_normal(len(angle)))[:, None]
-    white = white + (_VEIN - white) * (0.55 * _step(angle, 0.6, 1.4))[:, None]
+    white = white + (_VEIN - white) * (0.55 * step(angle, 0.6, 1.4))[:, None]
     colour = np.where((angle < PUPIL)[:, None], _BLACK, iris)
     return np.where((angle > IRIS)[:, None], white, colour)
 
@@ -338,8 +339,3 @@ def grid_quads(n_rows: int, n_columns: int, *, closed: bool = True) -> NDArray[n
     onward = (columns + 1) % n_columns
     corners = (rows, columns), (rows + 1, columns), (rows + 1, onward), (rows, onward)
     return np.stack([r * n_columns + c for r, c in corners], axis=-1).reshape(-1, 4).astype(np.int64)
-
-
-def _step(x: Floats, low: float, high: float) -> Floats:
-    t: Floats = np.clip((x - low) / (high - low), 0.0, 1.0)
-    return t * t * (3 - 2 * t)

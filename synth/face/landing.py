@@ -92,9 +92,9 @@ class Landing:
             missing[:, own] *= driven[:, own, None]
             missing[:, own, 1] += (1.0 - driven[:, own]) * follow
             pinned[:, own] = 1.0
-        count = pinned[:, :, None] * self._kernel * pinned[:, None, :]
-        count += np.eye(len(self._kernel)) * (1.0 - pinned**2)[:, :, None]
-        bumps: Floats = pinned[:, :, None] * np.linalg.solve(count, pinned[:, :, None] * missing)
+        system = pinned[:, :, None] * self._kernel * pinned[:, None, :]
+        system += np.eye(len(self._kernel)) * (1.0 - pinned**2)[:, :, None]
+        bumps: Floats = pinned[:, :, None] * np.linalg.solve(system, pinned[:, :, None] * missing)
         return bumps
 
 

@@ -32,6 +32,7 @@ _LIPS_APART, _LIDS_APART = 0.45, 0.30
 """Distance in the further coordinates between lower and upper lip, and between lower and upper lid; dm."""
 
 _NEAREST_LID = 0.08
+"""How far from the skin a lash may be to go with it; dm."""
 
 
 class ControlPoints:
@@ -78,11 +79,11 @@ class ControlPoints:
             near = np.flatnonzero(values)
             bumps[start + near, [column] * len(near)] = values[near]
         basis = bumps.tocsr()
-        self.basis = sparse.csr_array(_with_lashes(basis, at, skin, skin_start))
+        self.basis = _with_lashes(basis, at, skin, skin_start)
         self.kernel = self.basis[self.rows].toarray()
-        morphs = {"skin": skin.morphs[:, own[~on_tongue]], "tongue": tongue.morphs[:, own[on_tongue]]}
         self.reach = np.zeros((len(skin.morphs), len(self.names), 3))
-        self.reach[:, ~on_tongue], self.reach[:, on_tongue] = morphs["skin"], morphs["tongue"]
+        self.reach[:, ~on_tongue] = skin.morphs[:, own[~on_tongue]]
+        self.reach[:, on_tongue] = tongue.morphs[:, own[on_tongue]]
 
 
 def displacing_faps() -> tuple[Fap, ...]:
@@ -120,8 +121,8 @@ def _with_lashes(
 ) -> sparse.csr_array:
     """Let each lash go with the skin that it grows on."""
     tree = cKDTree(skin.vertices)
-    pieces = [basis]
     n = basis.shape[0]
+    whole = basis
     for name, (surface, start) in at.items():
         if "lashes" in name:
             distance, nearest = tree.query(surface.vertices)
@@ -129,8 +130,5 @@ def _with_lashes(
             choose = sparse.csr_array(
                 (np.ones(len(rooted)), (start + rooted, skin_start + nearest[rooted])), shape=(n, n)
             )
-            pieces.append(choose @ basis)
-    total = pieces[0]
-    for piece in pieces[1:]:
-        total = total + piece
-    return sparse.csr_array(total)
+            whole = whole + choose @ basis
+    return sparse.csr_array(whole)

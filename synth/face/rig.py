@@ -21,6 +21,7 @@ _NEAR_CROWN = 0.15
 """How far from the top of the skull the top of the hair is looked for; dm."""
 
 _NO_TURN = 1e-12
+"""Largest angle of the head, in radians, that is taken for none."""
 
 _LID_REACH, _LID_FILM = 1.6, 0.02
 """How far from an eyeball skin counts as its lids, and how far these stay off it, in parts of the ball's radius."""
@@ -99,11 +100,12 @@ class Rig:
 
     def feature_points(self) -> dict[str, Floats]:
         """Return the neutral positions of all 84 feature points of MPEG-4 on the drawn figure: (3,), dm."""
-        points = feature_points(self.face)
+        bare = feature_points(self.face)
+        points = dict(bare)
         skin = [name for name in VERTICES if not name.startswith("6.")]
         points.update(zip(skin, self._rest[self.spans["skin"].start + skin_rows(self.face, skin)], strict=True))
         # The scalp's rows carry the hair's thickness, so the skull lies where the bare face has it.
-        points[SKULL_TOP] = feature_points(self.face)[SKULL_TOP]
+        points[SKULL_TOP] = bare[SKULL_TOP]
         above = np.hypot(*(self._rest - points[SKULL_TOP])[:, [0, 2]].T) < _NEAR_CROWN
         points[HAIR_TOP] = points[SKULL_TOP] * (1, 0, 1) + (0, self._rest[above, 1].max(), 0)
         return points
@@ -126,9 +128,8 @@ class Rig:
         positions = self._rest + (self._morphs @ motion.weights[frame]).reshape(-1, 3)
         if points:
             positions += self.control.basis @ motion.residual[frame]
-        for eye in range(len(EYES)):
-            self._keep_off(positions, eye, motion.thrust[frame, eye])
         for eye, name in enumerate(EYES):
+            self._keep_off(positions, eye, motion.thrust[frame, eye])
             span, centre = self.spans[name], self.face.eye_centres[eye]
             turn = Rotation.from_euler("YX", motion.eyes[frame, eye]).as_matrix()
             ball = self._rest[span] - centre + (motion.pupils[frame, eye] - 1.0) * self._pupil_growth

@@ -1,6 +1,7 @@
 """Surfaces: the pieces that a picture of the face is made of."""
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,6 +52,12 @@ class Surface:
     follow: Floats
     drawn: NDArray[np.bool_]
 
+    def part(self, rows: NDArray[np.int64], quads: NDArray[np.int64], drawn: NDArray[np.bool_]) -> Self:
+        """Return some vertices (K,) of the surface, with quads (Q, 4) in terms of them, of which some are drawn."""
+        by_vertex = ("vertices", "uv", "colour", "cover", "shade", "gloss", "follow")
+        own = {name: getattr(self, name)[rows] for name in by_vertex}
+        return replace(self, **own, morphs=self.morphs[:, rows], quads=quads, drawn=drawn)
+
 
 def loose_surface(
     name: str,
@@ -99,13 +106,5 @@ def detach(surface: Surface, name: str, quads: NDArray[np.bool_]) -> tuple[Surfa
         The quads with copies of their vertices, in the order of the whole surface.
     """
     rows, own = np.unique(surface.quads[quads], return_inverse=True)
-    by_vertex = ("vertices", "uv", "colour", "cover", "shade", "gloss", "follow")
-    piece = replace(
-        surface,
-        **{attribute: getattr(surface, attribute)[rows] for attribute in by_vertex},
-        name=name,
-        morphs=surface.morphs[:, rows],
-        quads=own.reshape(-1, 4).astype(np.int64),
-        drawn=surface.drawn[quads],
-    )
-    return replace(surface, drawn=surface.drawn & ~quads), piece
+    piece = surface.part(rows, own.reshape(-1, 4).astype(np.int64), surface.drawn[quads])
+    return replace(surface, drawn=surface.drawn & ~quads), replace(piece, name=name)

@@ -6,7 +6,7 @@ of shared edges become corners of the large quad, too, so that no cracks appear.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +75,11 @@ def reduced(face: FaceModel, surfaces: Sequence[Surface]) -> tuple[list[Surface]
             pieces.append(tessellate(surface.quads, len(face.vertices), fine=fine, drawn=surface.drawn))
         else:
             pieces.append(_whole(surface))
-    return [_kept(surface, piece) for surface, piece in zip(surfaces, pieces, strict=True)], pieces
+    kept = [
+        surface.part(piece.rows, piece.faces, np.ones(len(piece.faces), dtype=bool))
+        for surface, piece in zip(surfaces, pieces, strict=True)
+    ]
+    return kept, pieces
 
 
 def _fine(face: FaceModel, skin: Surface) -> Flags:
@@ -93,18 +97,6 @@ def _fine(face: FaceModel, skin: Surface) -> Flags:
     inside = mouth.min(axis=1) > 0.5
     fine: Flags = rough & facing & ~inside
     return fine
-
-
-def _kept(surface: Surface, piece: Tessellation) -> Surface:
-    rows = piece.rows
-    by_vertex = ("vertices", "uv", "colour", "cover", "shade", "gloss", "follow")
-    return replace(
-        surface,
-        **{name: getattr(surface, name)[rows] for name in by_vertex},
-        morphs=surface.morphs[:, rows],
-        quads=piece.faces,
-        drawn=np.ones(len(piece.faces), dtype=bool),
-    )
 
 
 def _whole(surface: Surface) -> Tessellation:

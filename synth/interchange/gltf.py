@@ -12,6 +12,7 @@ from typing import Any
 import imageio.v3 as iio
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from synth.errors import SpecError
@@ -275,16 +276,10 @@ def _primitive_targets(builder: GlbBuilder, targets: _Targets, rows: Indices) ->
 def _colours(rig: Rig) -> tuple[Floats, Floats]:
     """Return each vertex's colour and the factor of the painting that shows it, twice (N, 3), linear light."""
     height, width = rig.texture.shape[:2]
-    # The painting's rows and columns at the vertices, between the centres of its pixels.
-    column = np.clip(rig.uv[:, 0] * width - 0.5, 0, width - 1)
-    row = np.clip((1.0 - rig.uv[:, 1]) * height - 0.5, 0, height - 1)
-    painting = rig.texture / 255.0
-    low_row, low_column = np.floor(row).astype(int), np.floor(column).astype(int)
-    high_row, high_column = np.minimum(low_row + 1, height - 1), np.minimum(low_column + 1, width - 1)
-    down, right = (row - low_row)[:, None], (column - low_column)[:, None]
-    upper = painting[low_row, low_column] * (1 - right) + painting[low_row, high_column] * right
-    lower = painting[high_row, low_column] * (1 - right) + painting[high_row, high_column] * right
-    texel = upper * (1 - down) + lower * down
+    # The painting at the vertices, between the centres of its pixels.
+    at = [(1.0 - rig.uv[:, 1]) * height - 0.5, rig.uv[:, 0] * width - 0.5]
+    painting = np.moveaxis(rig.texture / 255.0, 2, 0)
+    texel = np.stack([map_coordinates(layer, at, order=1, mode="nearest") for layer in painting], axis=1)
     # The rig's light is the square of sRGB; viewers use the true curve.
     wanted = _linear(np.sqrt(rig.paint[:, :3] + rig.paint[:, 3:] * texel**2))
     return wanted, wanted / np.maximum(_linear(texel), 1e-6)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synth import clip
+from synth import clip, lineage
 from synth.clip import ClipSpec, clip_digest, clip_faps, draw_expressions, render_clip, render_faps, render_still
 from synth.errors import AssetError, SpecError, VideoError
 from synth.pad import emotion_words
@@ -89,14 +89,14 @@ def test_the_digest_changes_with_every_field(face_dir, monkeypatch):
 @pytest.mark.parametrize("part", ["RENDERER_VERSION", "FORMAT"])
 def test_the_digest_changes_with_renderer_and_format(face_dir, monkeypatch, part):
     before = clip_digest(TINY, face_dir)
-    monkeypatch.setattr(clip, part, "another")
+    monkeypatch.setattr(lineage, part, "another")
     assert clip_digest(TINY, face_dir) != before
 
 
 @pytest.mark.parametrize("part", ["asset_digest", "translation_digest"])
 def test_the_digest_changes_with_face_and_translation(face_dir, monkeypatch, part):
     before = clip_digest(TINY, face_dir)
-    monkeypatch.setattr(clip, part, lambda *_: "another")
+    monkeypatch.setattr(lineage, part, lambda *_: "another")
     assert clip_digest(TINY, face_dir) != before
 
 
@@ -121,7 +121,7 @@ def test_a_clip_is_the_film_of_its_faps(face_dir, tmp_path):
     size = {"fps": TINY.fps, "width": TINY.width, "height": TINY.height}
     lineage = render_faps(faps, tmp_path / "faps.mp4", face_dir, **size)
     assert (tmp_path / "clip.mp4").read_bytes() == (tmp_path / "faps.mp4").read_bytes()
-    assert json.loads(json.dumps(lineage, allow_nan=False)) == lineage
+    assert json.loads(json.dumps(made, allow_nan=False)) == made
     assert faps.shape == (12, 68)
     assert (lineage["frames"], lineage["duration_s"]) == (12, pytest.approx(1.2))
     other = render_faps(faps[::-1], tmp_path / "back.mp4", face_dir, **size)
@@ -149,16 +149,16 @@ def test_expressions_are_drawn_in_their_order(face_dir):
 
 
 def test_lineage(face_dir, tmp_path):
-    lineage = render_clip(replace(TINY, text="one two", seed=4, intensity=0.5), tmp_path / "clip.mp4", face_dir)
-    assert json.loads(json.dumps(lineage, allow_nan=False)) == lineage
-    assert lineage["frames"] == 12
-    assert lineage["duration_s"] == pytest.approx(1.2)
-    assert (lineage["text"], lineage["seed"], lineage["pad"]) == ("one two", 4, [0.55, 0.24, 0.28])
-    assert lineage["digest"] == clip_digest(ClipSpec.from_dict(lineage["spec"]), face_dir)
+    made = render_clip(replace(TINY, text="one two", seed=4, intensity=0.5), tmp_path / "clip.mp4", face_dir)
+    assert json.loads(json.dumps(made, allow_nan=False)) == made
+    assert made["frames"] == 12
+    assert made["duration_s"] == pytest.approx(1.2)
+    assert (made["text"], made["seed"], made["pad"]) == ("one two", 4, [0.55, 0.24, 0.28])
+    assert made["digest"] == clip_digest(ClipSpec.from_dict(made["spec"]), face_dir)
     full = render_still((0.55, 0.24, 0.28), tmp_path / "still.png", face_dir, width=32, height=32)
-    np.testing.assert_allclose(2 * np.array(lineage["pep"]), full["pep"])
-    assert 2 * lineage["fap"]["12"] == pytest.approx(full["fap"]["12"])
-    assert set(lineage["versions"]) == {"padlab", "numpy", "pyrender", "ffmpeg"}
+    np.testing.assert_allclose(2 * np.array(made["pep"]), full["pep"])
+    assert 2 * made["fap"]["12"] == pytest.approx(full["fap"]["12"])
+    assert set(made["versions"]) == {"padlab", "numpy", "pyrender", "ffmpeg"}
 
 
 @pytest.mark.parametrize(

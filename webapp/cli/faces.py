@@ -8,7 +8,7 @@ from synth.expression.pad_pep import MODEL_NAMES
 from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES, find_identity
 from synth.sheet import expressions, render_sheet
 from webapp.cli.context import echo_json
-from webapp.cli.options import FILE, SizeType, check_out, face_dir
+from webapp.cli.options import FILE, SizeType, check_out, end_on_signals, face_dir
 
 
 @click.command()
@@ -62,6 +62,7 @@ def faces(
     WORD is one of the papers' fourteen emotion words, one of the six basic emotions (joy, anger, sadness, surprise,
     fear, disgust) or neutral; "basic" stands for the six, "all" for the fourteen.
     """
+    end_on_signals()
     check_out(out, ".png")
     expressions(words)
     for name in chosen:

@@ -11,7 +11,7 @@ from synth.fap.file import FapFile, read_fap
 from synth.fap.table import column, faps
 from webapp.cli.animation import write_animation
 from webapp.cli.context import echo_json, progress_bar
-from webapp.cli.options import FILE, check_out, face_dir, identity_option, size_option
+from webapp.cli.options import FILE, check_out, end_on_signals, face_dir, identity_option, size_option
 
 
 @click.group()
@@ -27,6 +27,7 @@ def fap() -> None:
 @size_option
 def render(*, file: Path, out: Path, audio: Path | None, identity: str, size: tuple[int, int]) -> None:
     """Make a clip of a FAP file, at its own frame rate."""
+    end_on_signals()
     check_out(out, ".mp4")
     if audio is not None and audio.suffix.lower() != ".wav":
         raise click.BadParameter(f"'{audio}' must end with .wav", param_hint="--audio")
@@ -53,6 +54,7 @@ def render(*, file: Path, out: Path, audio: Path | None, identity: str, size: tu
 @identity_option
 def export(*, file: Path, out: Path, identity: str) -> None:
     """Convert a FAP file to ARKit weights or glTF, by the suffix of --out."""
+    end_on_signals()
     check_out(out, ".json", ".csv", ".glb")
     find_identity(identity)
     found = _read(file)

@@ -69,10 +69,9 @@ def check_out(out: Path | None, *suffixes: str, option: str = "--out") -> None:
         raise ConfigError(
             f"The folder {folder} cannot be written to ({error.strerror or error}); name another with {option}"
         ) from error
-    _end_on_signals()
 
 
-def _end_on_signals() -> None:
+def end_on_signals() -> None:
     """Let a closed terminal or a stopped service end the command as Ctrl-C does: with nothing half-written left."""
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda which, _frame: sys.exit(128 + which))

@@ -13,7 +13,7 @@ from synth.files import write_whole
 from synth.pad import PAD
 from webapp.cli.animation import write_animation
 from webapp.cli.context import NEGATIVE_NUMBERS
-from webapp.cli.options import FILE, check_out, face_dir, identity_option, size_option
+from webapp.cli.options import FILE, check_out, end_on_signals, face_dir, identity_option, size_option
 
 CJK = re.compile(r"[\u3400-\u9fff]")
 
@@ -30,6 +30,7 @@ CJK = re.compile(r"[\u3400-\u9fff]")
 @size_option
 def face(*, p: float, a: float, d: float, out: Path, model: str, identity: str, size: tuple[int, int]) -> None:
     """Draw the face of the emotion P A D (pleasure, arousal, dominance, each from -1 to 1)."""
+    end_on_signals()
     check_out(out, ".png")
     # Checked before the face data is fetched: a wrong number should not cost a download.
     pad = PAD.parse((p, a, d)).as_tuple()
@@ -76,6 +77,7 @@ def say(
     lineage: Path | None,
 ) -> None:
     """Make a clip that is as long as TEXT takes to say, with the expression of the emotion --pad."""
+    end_on_signals()
     check_out(out, ".mp4")
     check_out(fap, ".fap", option="--fap")
     check_out(arkit, ".json", ".csv", option="--arkit")

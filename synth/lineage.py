@@ -1,0 +1,55 @@
+"""Lineage: what made a picture, as plain JSON values, so that it can be told later and made again."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import imageio_ffmpeg
+import numpy as np
+from numpy.typing import NDArray
+
+from synth.expression.pad_pep import load_model
+from synth.expression.pep_fap import translation_digest
+from synth.face.assets import asset_digest
+from synth.render import RENDERER_VERSION
+
+Floats = NDArray[np.float64]
+
+FORMAT = 2
+"""Part of a clip's identity; raise it when clips change though specification, models, face and renderer stay."""
+
+
+def picture_digests(face_dir: Path) -> dict[str, Any]:
+    """Return what pictures depend on besides the FAP values and the identity.
+
+    Raises
+    ------
+    AssetError
+        If the face data in ``face_dir`` are missing or damaged.
+    """
+    return {"format": FORMAT, "assets": asset_digest(face_dir), "renderer": RENDERER_VERSION}
+
+
+def digests(model: str, face_dir: Path) -> dict[str, Any]:
+    """Return what pictures of an expression depend on besides its PAD: `picture_digests` and the model's.
+
+    Raises
+    ------
+    AssetError
+        If the face data in ``face_dir`` are missing or damaged.
+    """
+    # A clip's identity is a digest of this text, so the order of the keys stays.
+    own = {"format": FORMAT, "model": load_model(model).digest, "pep_fap": translation_digest()}
+    return own | picture_digests(face_dir)
+
+
+def expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> dict[str, Any]:
+    """Return PAD, PEPs (9,) and the FAPs (68,), in FAPU, of an expression; FAPs of 0 are left out."""
+    faps = {str(k + 1): value for k, value in enumerate(apex.tolist()) if value}
+    return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of padlab and of the programs that its bytes depend on."""
+    packages = {name: version(name) for name in ("padlab", "numpy", "pyrender")}
+    return packages | {"ffmpeg": imageio_ffmpeg.get_ffmpeg_version()}
