@@ -119,13 +119,13 @@ def test_a_clip_is_the_film_of_its_faps(face_dir, tmp_path):
     render_clip(TINY, tmp_path / "clip.mp4", face_dir)
     faps = clip_faps(TINY)
     size = {"fps": TINY.fps, "width": TINY.width, "height": TINY.height}
-    lineage = render_faps(faps, tmp_path / "faps.mp4", face_dir, **size)
+    made = render_faps(faps, tmp_path / "faps.mp4", face_dir, **size)
     assert (tmp_path / "clip.mp4").read_bytes() == (tmp_path / "faps.mp4").read_bytes()
     assert json.loads(json.dumps(made, allow_nan=False)) == made
     assert faps.shape == (12, 68)
-    assert (lineage["frames"], lineage["duration_s"]) == (12, pytest.approx(1.2))
+    assert (made["frames"], made["duration_s"]) == (12, pytest.approx(1.2))
     other = render_faps(faps[::-1], tmp_path / "back.mp4", face_dir, **size)
-    assert other["digests"]["faps"] != lineage["digests"]["faps"]
+    assert other["digests"]["faps"] != made["digests"]["faps"]
 
 
 def test_films_of_wrong_faps_are_refused(face_dir, tmp_path):
