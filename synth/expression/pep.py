@@ -1,12 +1,15 @@
-"""The nine partial expression parameters (PEP) of MTAP 2013, Table 5.
+"""The partial expression parameters (PEP) of the two papers.
 
-PEP values are arrays (N, 9), PEP n in column n - 1, each in [-1, 1]; zero is the neutral face.
+A scheme is one paper's set of parameters: ``mtap2013`` has nine (Table 5), ``acii2007`` eighteen with left and right
+(Tables 1 and 2). PEP values are arrays (N, K) in the scheme's order, each in [-1, 1]; zero is the neutral face.
 """
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +18,11 @@ from synth.errors import SpecError
 
 Floats = NDArray[np.float64]
 
+MTAP, ACII = "mtap2013", "acii2007"
+"""The nine parameters of MTAP 2013, and the eighteen of ACII 2007."""
+
 PEP_COUNT = 9
+"""Parameters of the scheme `MTAP`, which the avatar's models predict."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,19 +31,19 @@ class Pep:
 
     Attributes
     ----------
-    pep : int
-        Number, 1 to 9.
+    code : str
+        Number in the paper's table, for instance "8" (MTAP) or "1.1L" (ACII).
     name : str
-        Name in Table 5.
+        What it does.
     key : int
         The key FAP, which stands for the whole movement.
     faps : tuple of int
-        All its FAPs, the key among them.
+        All its FAPs, the key among them, in order.
     minus, plus : str
         What -1 and +1 look like.
     """
 
-    pep: int
+    code: str
     name: str
     key: int
     faps: tuple[int, ...]
@@ -45,14 +52,36 @@ class Pep:
 
 
 @cache
-def peps() -> tuple[Pep, ...]:
-    """Return the nine parameters in order."""
+def _schemes() -> Mapping[str, tuple[Pep, ...]]:
     text = resources.files("synth.data").joinpath("pep.json").read_text(encoding="utf-8")
-    return tuple(Pep(**{**row, "faps": tuple(row["faps"])}) for row in json.loads(text)["peps"])
+    return MappingProxyType(
+        {
+            name: tuple(Pep(**{**row, "faps": tuple(row["faps"])}) for row in scheme["peps"])
+            for name, scheme in json.loads(text)["schemes"].items()
+        }
+    )
 
 
-def check_peps(values: NDArray[np.floating] | Floats) -> Floats:
-    """Return ``values`` as an (N, 9) float64 array.
+def peps(scheme: str = MTAP) -> tuple[Pep, ...]:
+    """Return the parameters of a scheme in order.
+
+    Raises
+    ------
+    SpecError
+        If there is no such scheme.
+    """
+    if scheme not in _schemes():
+        raise SpecError(f"PEP: there is no scheme {scheme!r}; there are {', '.join(_schemes())}.")
+    return _schemes()[scheme]
+
+
+def codes(scheme: str = MTAP) -> tuple[str, ...]:
+    """Return the codes of a scheme's parameters in order."""
+    return tuple(pep.code for pep in peps(scheme))
+
+
+def check_peps(values: NDArray[np.floating] | Floats, scheme: str = MTAP) -> Floats:
+    """Return ``values`` as an (N, K) float64 array.
 
     Raises
     ------
@@ -60,9 +89,10 @@ def check_peps(values: NDArray[np.floating] | Floats) -> Floats:
         If the shape is another or a value is not a finite number.
     """
     array = np.asarray(values, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] != PEP_COUNT:
-        raise SpecError(f"PEP: the values have shape {array.shape}, but must be (N, {PEP_COUNT}).")
+    count = len(peps(scheme))
+    if array.ndim != 2 or array.shape[1] != count:
+        raise SpecError(f"PEP: the values have shape {array.shape}, but must be (N, {count}).")
     if not np.isfinite(array).all():
         row, col = np.argwhere(~np.isfinite(array))[0]
-        raise SpecError(f"PEP: the value of PEP {col + 1} in row {row} is not a finite number.")
+        raise SpecError(f"PEP: the value of PEP {codes(scheme)[col]} in row {row} is not a finite number.")
     return array

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from synth.errors import SpecError
-from synth.expression.pep import check_peps, peps
+from synth.expression.pep import ACII, check_peps, codes, peps
+from synth.fap.table import faps
 
 TABLE_5 = {
     1: ({31, 32, 33, 34, 35, 36}, 34),
@@ -19,7 +20,7 @@ TABLE_5 = {
 
 def test_table_5():
     # MTAP 2013, Table 5: FAP subsets with the key FAP in parentheses.
-    assert {pep.pep: (set(pep.faps), pep.key) for pep in peps()} == TABLE_5
+    assert {int(pep.code): (set(pep.faps), pep.key) for pep in peps()} == TABLE_5
 
 
 def test_37_distinct_faps():
@@ -29,7 +30,47 @@ def test_37_distinct_faps():
 
 
 def test_order_is_by_number():
-    assert [pep.pep for pep in peps()] == list(range(1, 10))
+    assert codes() == tuple("123456789")
+
+
+ACII_TABLE_2 = {
+    "1.1": (33, {33, 31, 35, 34, 32, 36}),
+    "1.2": (37, {37, 38}),
+    "1.3": (31, {31, 35, 33, 32, 36, 34}),
+    "2.1": (19, {19, 21, 20, 22}),
+    "2.2": (23, {23, 24}),
+    "2.3": (25, {25, 26}),
+    "3.1": (5, {5, 10, 11, 52, 57, 58, 4, 8, 9, 51, 55, 56}),
+    "3.2": (12, {12, 13, 59, 60}),
+    "3.3": (16, {16, 17}),
+    "3.4": (6, {6, 7, 53, 54}),
+    "4.1": (3, {3}),
+    "4.2": (15, {15}),
+}
+
+
+def test_acii_table_2():
+    # The paper names the left key of each pair, and the FAPs of both sides together.
+    found = {}
+    for pep in peps(ACII):
+        key, group = found.setdefault(pep.code.rstrip("LR"), (pep.key, set()))
+        group.update(pep.faps)
+    assert found == ACII_TABLE_2
+    assert len(peps(ACII)) == 18
+
+
+def test_acii_sides_mirror_each_other():
+    by_code = {pep.code: pep for pep in peps(ACII)}
+    for code, pep in by_code.items():
+        if code.endswith("L"):
+            other = by_code[code[:-1] + "R"]
+            assert tuple(faps()[fap].mirror for fap in pep.faps) == other.faps
+            assert faps()[pep.key].mirror == other.key
+
+
+def test_unknown_scheme():
+    with pytest.raises(SpecError, match="acii2007"):
+        peps("candide")
 
 
 def test_values_are_checked():
