@@ -1,14 +1,9 @@
 """The figures of a report, as SVG."""
 
-import io
-import re
 import textwrap
 from collections.abc import Callable
-from threading import Lock
 from types import MappingProxyType
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,30 +12,12 @@ from matplotlib.ticker import MaxNLocator
 from evaluation.errors import EvaluationError
 from evaluation.instruments.mos import MOS5
 from evaluation.report.analysis import ReverseEvaluation, StudyReport, Unavailable
+from evaluation.report.drawing import COLOURS, GRID, INK, NAMES_OF_DIMENSIONS, SHAPES, SOFT, as_svg, drawable, prepare
 from evaluation.report.labels import place_labels
 from evaluation.report.tables import label
 from evaluation.responses import DIMENSIONS
 from evaluation.statistics import wording
 from evaluation.statistics.opinion import OpinionScore
-
-# Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008); shapes tell the same again.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-_SHAPES = ("o", "s", "^", "D", "v", "P")
-_INK, _SOFT, _GRID = "#222222", "#6b6b6b", "#e3e3e3"
-
-# Text stays text, so that it can be read aloud, searched and shown in the reader's fonts; fixed ids make the drawing
-# of the same data the same file; a dollar sign in a label is a dollar sign.
-_SETTINGS: dict[Any, Any] = {
-    "svg.fonttype": "none",
-    "svg.hashsalt": "padlab",
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans", "Verdana", "Arial", "Noto Sans", "sans-serif"],
-    "axes.unicode_minus": True,
-    "text.parse_math": False,
-}
-_drawing = Lock()
-
-_NAMES_OF_DIMENSIONS = {"P": "Pleasure", "A": "Arousal", "D": "Dominance"}
 
 
 def draw(name: str, report: StudyReport) -> str:
@@ -66,12 +43,7 @@ def draw(name: str, report: StudyReport) -> str:
     """
     if name not in _FIGURES:
         raise EvaluationError(f"There is no figure {name!r}; there are {', '.join(_FIGURES)}.")
-    out = io.StringIO()
-    # matplotlib reads these settings from the whole process while it draws, so drawings take turns.
-    with _drawing, mpl.rc_context(_SETTINGS):
-        _FIGURES[name](report).savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    svg = out.getvalue()
-    return _with_own_ids(svg[svg.index("<svg") :], name)
+    return as_svg(lambda: _FIGURES[name](report), name=name)
 
 
 def caption(name: str) -> str:
@@ -103,12 +75,12 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     limit = _pad_limit(report)
     pooled = {found.dimension: found for found in report.reverse_evaluation if found.condition is None}
     for axes, dimension in zip(panels, DIMENSIONS, strict=True):
-        _prepare(axes)
+        prepare(axes)
         axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal")
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.yaxis.set_major_locator(MaxNLocator(5))
-        axes.set_xlabel(f"Input {dimension}", color=_INK)
-        axes.set_ylabel(f"Evaluated {dimension}", color=_INK)
+        axes.set_xlabel(f"Input {dimension}", color=INK)
+        axes.set_ylabel(f"Evaluated {dimension}", color=INK)
         _draw_dimension(axes, report, pooled[dimension], limit)
     handles, names = panels[0].get_legend_handles_labels()
     if handles:
@@ -116,12 +88,12 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     # The names can be placed only when the layout has settled where each point is.
     figure.draw_without_rendering()
     means = report.pad_by_stimulus
-    words = [_drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
+    words = [drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
     for axes, dimension in zip(panels, DIMENSIONS, strict=True):
         xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)
         known = ~np.isnan(xs)
         shown = [word for word, is_known in zip(words, known, strict=True) if is_known]
-        place_labels(axes, xs[known], ys[known], shown, color=_INK, size=7)
+        place_labels(axes, xs[known], ys[known], shown, color=INK, size=7)
     return figure
 
 
@@ -144,11 +116,11 @@ def mos_by_condition(report: StudyReport) -> Figure:
     """
     figure = Figure(figsize=(2.4 + 1.7 * max(2, len(report.mos_by_condition)), 4.6), layout="constrained")
     axes = figure.subplots()
-    _prepare(axes)
-    axes.grid(axis="y", color=_GRID)
+    prepare(axes)
+    axes.grid(axis="y", color=GRID)
     axes.set_axisbelow(True)
     for place, found in enumerate(report.mos_by_condition):
-        colour, shape = _COLOURS[place % len(_COLOURS)], _SHAPES[place % len(_SHAPES)]
+        colour, shape = COLOURS[place % len(COLOURS)], SHAPES[place % len(SHAPES)]
         cells = report.mos_by_cell[report.mos_by_cell["condition"] == found.condition]["mean"].to_numpy(dtype=float)
         # Stimuli side by side in the order of the file, so that a place on the page is always the same stimulus.
         beside = place - 0.3 + np.linspace(-0.12, 0.12, len(cells)) if len(cells) else np.array([])
@@ -156,14 +128,14 @@ def mos_by_condition(report: StudyReport) -> Figure:
         if isinstance(found.result, OpinionScore):
             _draw_opinion(axes, place, found.result, colour, shape)
         else:
-            axes.text(place, 3.5, "no ratings\nyet", ha="center", va="center", color=_SOFT, fontsize=9)
-    names = [_drawable(label(report.spec.condition(c.name).label), c.name) for c in report.spec.conditions]
+            axes.text(place, 3.5, "no ratings\nyet", ha="center", va="center", color=SOFT, fontsize=9)
+    names = [drawable(label(report.spec.condition(c.name).label), c.name) for c in report.spec.conditions]
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.6, len(names) - 0.4)
     options = sorted(MOS5.items[0].options, key=lambda option: option.value) if MOS5.items[0].kind == "likert" else []
     axes.set_yticks([option.value for option in options], [f"{o.label['en']}  {o.value}" for o in options])
     axes.set_ylim(0.8, 5.2)
-    axes.set_ylabel("Mean opinion score", color=_INK)
+    axes.set_ylabel("Mean opinion score", color=INK)
     return figure
 
 
@@ -188,9 +160,9 @@ NAMES = tuple(_FIGURES)
 
 def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, limit: float) -> None:
     dimension = found.dimension
-    axes.axhline(0, color=_GRID, linewidth=1, zorder=0)
-    axes.axvline(0, color=_GRID, linewidth=1, zorder=0)
-    axes.plot([-limit, limit], [-limit, limit], color=_SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
+    axes.axhline(0, color=GRID, linewidth=1, zorder=0)
+    axes.axvline(0, color=GRID, linewidth=1, zorder=0)
+    axes.plot([-limit, limit], [-limit, limit], color=SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
     for place, condition in enumerate(report.spec.conditions):
         cells = report.pad_by_cell[report.pad_by_cell["condition"] == condition.name]
         if len(report.spec.conditions) > 1 and len(cells):
@@ -198,28 +170,28 @@ def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, l
                 cells[f"input_{dimension}"].to_numpy(dtype=float),
                 cells[dimension].to_numpy(dtype=float),
                 linestyle="",
-                marker=_SHAPES[place % len(_SHAPES)],
+                marker=SHAPES[place % len(SHAPES)],
                 markersize=4.5,
-                color=_COLOURS[place % len(_COLOURS)],
+                color=COLOURS[place % len(COLOURS)],
                 alpha=0.55,
                 markeredgewidth=0,
-                label=_drawable(label(condition.label), condition.name),
+                label=drawable(label(condition.label), condition.name),
                 zorder=2,
             )
     means = report.pad_by_stimulus
     xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)
     if len(xs):
-        axes.plot(xs, ys, linestyle="", marker="o", markersize=5, color=_INK, label="All conditions", zorder=4)
-    name = _NAMES_OF_DIMENSIONS[dimension]
+        axes.plot(xs, ys, linestyle="", marker="o", markersize=5, color=INK, label="All conditions", zorder=4)
+    name = NAMES_OF_DIMENSIONS[dimension]
     if isinstance(found.result, Unavailable):
-        axes.set_title(name, color=_INK, fontsize=12)
+        axes.set_title(name, color=INK, fontsize=12)
         box = {"facecolor": "white", "edgecolor": "none"}
         reason = textwrap.fill(found.result.reason, 30)
-        axes.text(0, limit * 0.5, reason, ha="center", va="center", color=_SOFT, fontsize=9, bbox=box)
+        axes.text(0, limit * 0.5, reason, ha="center", va="center", color=SOFT, fontsize=9, bbox=box)
         return
-    axes.set_title(f"{name}: r = {wording.share(found.result.r)}", color=_INK, fontsize=12)
+    axes.set_title(f"{name}: r = {wording.share(found.result.r)}", color=INK, fontsize=12)
     ends = np.array([np.nanmin(xs), np.nanmax(xs)])
-    axes.plot(ends, found.result.intercept + found.result.slope * ends, color=_INK, linewidth=1.4, zorder=3)
+    axes.plot(ends, found.result.intercept + found.result.slope * ends, color=INK, linewidth=1.4, zorder=3)
 
 
 def _draw_opinion(axes: Axes, place: int, found: OpinionScore, colour: str, shape: str) -> None:
@@ -235,15 +207,9 @@ def _draw_opinion(axes: Axes, place: int, found: OpinionScore, colour: str, shap
         xytext=(12, 0),
         textcoords="offset points",
         va="center",
-        color=_INK,
+        color=INK,
         fontsize=11,
     )
-
-
-def _prepare(axes: Axes) -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(_SOFT)
-    axes.tick_params(colors=_INK, labelsize=9, length=3)
 
 
 def _pad_limit(report: StudyReport) -> float:
@@ -251,15 +217,3 @@ def _pad_limit(report: StudyReport) -> float:
     values = np.abs(report.pad_by_cell[columns].to_numpy(dtype=float))
     largest = float(np.nanmax(values)) if values.size and not np.isnan(values).all() else 1.0
     return min(1.05, float(np.ceil(largest * 10 + 0.5)) / 10)
-
-
-def _drawable(text: str, otherwise: str) -> str:
-    # matplotlib's own font measures the text, and it has no Chinese characters.
-    return text if all(ord(character) < 0x0500 for character in text) else otherwise
-
-
-def _with_own_ids(svg: str, name: str) -> str:
-    prefix = name.replace("_", "-")
-    svg = re.sub(r'\bid="([^"]+)"', rf'id="{prefix}-\1"', svg)
-    svg = re.sub(r'href="#([^"]+)"', rf'href="#{prefix}-\1"', svg)
-    return re.sub(r"url\(#([^)]+)\)", rf"url(#{prefix}-\1)", svg)
