@@ -65,7 +65,8 @@ class PAD:
 def emotion_words() -> Mapping[str, PAD]:
     """Return the fourteen emotion words and their input PAD (MTAP 2013, Table 8), in the table's order."""
     text = resources.files("synth.data").joinpath("pad_words.json").read_text(encoding="utf-8")
-    return MappingProxyType({word: PAD.parse(values) for word, values in json.loads(text)["words"].items()})
+    words = json.loads(text)["norms"]["chinese"]["words"]
+    return MappingProxyType({word: PAD.parse(values) for word, values in words.items()})
 
 
 def nearest_word(pad: PAD) -> str:

@@ -13,6 +13,7 @@ from synth.clip import draw_expressions
 from synth.errors import SpecError
 from synth.pad import PAD, emotion_words
 from synth.video import write_png
+from synth.words import look_up
 
 Picture = NDArray[np.uint8]
 Item = TypeVar("Item")
@@ -43,13 +44,13 @@ def expressions(words: Iterable[str]) -> list[tuple[str, PAD]]:
     Parameters
     ----------
     words : iterable of str
-        In any case: one of the fourteen emotion words, a key of `BASIC`, ``neutral``, or for several at once ``basic``
-        (the six) or ``all`` (the fourteen).
+        In any case: one of the fourteen emotion words, a key of `BASIC`, ``neutral``, any other word of the norms, or
+        for several at once ``basic`` (the six) or ``all`` (the fourteen).
 
     Raises
     ------
     SpecError
-        If a word is unknown; the message lists those that there are.
+        If a word is unknown; the message lists the most common ones and tells where the others are.
     """
     named = {word.lower(): pad for word, pad in emotion_words().items()}
     # Surprise and disgust are words of the papers, too, and mean the same there.
@@ -59,8 +60,7 @@ def expressions(words: Iterable[str]) -> list[tuple[str, PAD]]:
     for word in words:
         for single in groups.get(word.lower(), (word.lower(),)):
             if single not in named:
-                there = ", ".join([*emotion_words(), *BASIC, NEUTRAL, *groups])
-                raise SpecError(f"There is no expression {word!r}; there are {there}.")
+                named[single] = _pad_of(word, [*emotion_words(), *BASIC, NEUTRAL, *groups])
             found.append((single.capitalize(), named[single]))
     return found
 
@@ -164,6 +164,14 @@ def render_sheet(
     ]
     rows = [list(zip(names, row, strict=True)) for names, row in zip(labels, pictures, strict=True)]
     write_png(out, contact_sheet(rows))
+
+
+def _pad_of(word: str, common: Iterable[str]) -> PAD:
+    try:
+        return look_up(word).pad
+    except SpecError as error:
+        there = ", ".join(common)
+        raise SpecError(f"There is no expression {word!r}; there are {there}, and more in `padlab words`.") from error
 
 
 def _rows(items: Sequence[Item], columns: int) -> list[Sequence[Item]]:

@@ -6,6 +6,7 @@ from synth.errors import SpecError, VideoError
 from synth.face.identity import IDENTITIES
 from synth.pad import PAD, emotion_words
 from synth.sheet import BASIC, contact_sheet, expressions, render_sheet
+from synth.words import look_up
 
 PAPER = 255
 
@@ -27,11 +28,21 @@ def test_the_six_basic_emotions_have_the_papers_words():
         assert expressions([word])[0][1] == emotion_words()[paper]
 
 
+def test_other_words_of_the_norms_are_put_on_the_papers_scale():
+    assert expressions(["Terrified", "in love", "surprised"]) == [
+        ("Terrified", look_up("terrified").pad),
+        ("In love", look_up("In love").pad),
+        ("Surprised", emotion_words()["Surprise"]),
+    ]
+
+
 def test_an_unknown_word_is_told_with_those_there_are():
     with pytest.raises(SpecError, match="'glad'") as caught:
         expressions(["Happy", "glad"])
     for word in (*emotion_words(), *BASIC, "neutral", "all", "basic"):
         assert word in str(caught.value)
+    assert "`padlab words`" in str(caught.value)
+    assert "Terrified" not in str(caught.value)
 
 
 @pytest.mark.parametrize("lengths", [[1], [3], [3, 1], [8] * 7 + [4], [14] * 6])
