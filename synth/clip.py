@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from synth.errors import SpecError
 from synth.expression.course import Course, blink_track, expression_track
-from synth.expression.pad_pep import MODEL_NAMES, load_model
-from synth.expression.pep_fap import pep_to_fap
+from synth.expression.models import DEFAULT_MODEL, ExpressionModel, check_model_name, load_model
 from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
 from synth.fap.table import FAP_COUNT, check_sequence
 from synth.lineage import digests, expression, picture_digests, versions
@@ -48,8 +47,8 @@ class ClipSpec:
         Language of the text.
     pad : tuple of float
         Pleasure, arousal, dominance, each in [-1, 1].
-    model : {"table", "linear", "quadratic"}
-        The PAD to PEP model.
+    model : str
+        From PAD to the face, see `synth.expression.models.load_model`.
     intensity : float
         Factor of the partial expression parameters, 0 to 1.5.
     identity : str
@@ -72,7 +71,7 @@ class ClipSpec:
     text: str = ""
     lang: str = "en"
     pad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    model: str = "table"
+    model: str = DEFAULT_MODEL
     intensity: float = 1.0
     identity: str = DEFAULT_IDENTITY
     width: int = 720
@@ -86,7 +85,7 @@ class ClipSpec:
     def __post_init__(self) -> None:
         _check_text(self.text)
         _check_choice("lang", self.lang, LANGUAGES)
-        _check_choice("model", self.model, MODEL_NAMES)
+        check_model_name(self.model)
         _check_choice("identity", self.identity, tuple(IDENTITIES))
         # Equal specifications must be written alike, so 1 becomes 1.0 and -0.0 becomes 0.0.
         object.__setattr__(self, "pad", PAD.parse(self.pad).as_tuple())
@@ -131,7 +130,7 @@ class ClipSpec:
         return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
 
 
-def clip_digest(spec: ClipSpec, face_dir: Path) -> str:
+def clip_digest(spec: ClipSpec, face_dir: Path, models_dir: Path | None = None) -> str:
     """Return the clip's identity: the SHA-256 (hex) of all that its pictures depend on.
 
     Parameters
@@ -140,25 +139,30 @@ def clip_digest(spec: ClipSpec, face_dir: Path) -> str:
         The specification.
     face_dir : Path
         Folder of the compiled face data.
+    models_dir : Path, optional
+        Folder of trained models, for specifications that name one.
 
     Raises
     ------
     AssetError
         If the face data are missing or damaged.
+    SpecError
+        If there is no such model.
     """
-    return hashlib.sha256(json.dumps(digests(spec.model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
+    model = load_model(spec.model, models_dir)
+    return hashlib.sha256(json.dumps(digests(model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
 
 
-def clip_faps(spec: ClipSpec) -> Floats:
-    """Return the FAP values of a clip: (T, 68) float64, in FAPU."""
-    _, apex = _apex(spec.pad, spec.model, spec.intensity)
+def clip_faps(spec: ClipSpec, models_dir: Path | None = None) -> Floats:
+    """Return the FAP values of a clip: (T, 68) float64, in FAPU; ``models_dir`` as in `clip_digest`."""
+    _, apex = _apex(spec.pad, load_model(spec.model, models_dir), spec.intensity)
     expression = expression_track(apex, spec.course)
     tracks = [expression, blink_track(expression, spec.course, np.random.default_rng(spec.seed))]
     faps: Floats = np.sum(tracks, axis=0)
     return faps
 
 
-def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
+def render_clip(spec: ClipSpec, out: Path, face_dir: Path, models_dir: Path | None = None) -> dict[str, Any]:
     """Render a clip to an MP4 file; equal specifications give equal bytes.
 
     Parameters
@@ -167,8 +171,8 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
         The specification.
     out : Path
         The file; it appears complete or not at all. Its folder must exist.
-    face_dir : Path
-        Folder of the compiled face data.
+    face_dir, models_dir
+        As in `clip_digest`.
 
     Returns
     -------
@@ -181,19 +185,20 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path) -> dict[str, Any]:
     AssetError, RenderError, VideoError
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
+    model = load_model(spec.model, models_dir)
     stage = Stage(face_dir, spec.identity)
-    faps = clip_faps(spec)
+    faps = clip_faps(spec, models_dir)
     stage.film(faps, out, fps=spec.fps, width=spec.width, height=spec.height)
-    pep, apex = _apex(spec.pad, spec.model, spec.intensity)
+    pep, apex = _apex(spec.pad, model, spec.intensity)
     return {
-        "digest": clip_digest(spec, face_dir),
+        "digest": clip_digest(spec, face_dir, models_dir),
         "spec": spec.to_dict(),
         "text": spec.text,
         "seed": spec.seed,
         "frames": len(faps),
         "duration_s": len(faps) / spec.fps,
         **expression(spec.pad, pep, apex),
-        "digests": digests(spec.model, face_dir),
+        "digests": digests(model, face_dir),
         "versions": versions(),
     }
 
@@ -269,7 +274,8 @@ def render_still(
     out: Path,
     face_dir: Path,
     *,
-    model: str = "table",
+    models_dir: Path | None = None,
+    model: str = DEFAULT_MODEL,
     identity: str = DEFAULT_IDENTITY,
     width: int = 720,
     height: int = 576,
@@ -283,8 +289,8 @@ def render_still(
         Pleasure, arousal, dominance, each in [-1, 1].
     out : Path
         The file; it appears complete or not at all. Its folder must exist.
-    face_dir : Path
-        Folder of the compiled face data.
+    face_dir, models_dir
+        As in `clip_digest`.
     model, identity, width, height, intensity
         As in `ClipSpec`; odd sizes are welcome here.
 
@@ -302,10 +308,18 @@ def render_still(
     """
     point = PAD.parse(pad).as_tuple()
     for picture in draw_expressions(
-        [point], face_dir, model=model, identity=identity, width=width, height=height, intensity=intensity
+        [point],
+        face_dir,
+        models_dir=models_dir,
+        model=model,
+        identity=identity,
+        width=width,
+        height=height,
+        intensity=intensity,
     ):
         write_png(out, picture)
-    pep, apex = _apex(point, model, float(intensity))
+    chosen = load_model(model, models_dir)
+    pep, apex = _apex(point, chosen, float(intensity))
     return {
         "model": model,
         "identity": identity,
@@ -313,7 +327,7 @@ def render_still(
         "height": height,
         "intensity": float(intensity),
         **expression(point, pep, apex),
-        "digests": digests(model, face_dir),
+        "digests": digests(chosen, face_dir),
         "versions": versions(),
     }
 
@@ -322,7 +336,8 @@ def draw_expressions(
     pads: Sequence[tuple[float, float, float]],
     face_dir: Path,
     *,
-    model: str = "table",
+    models_dir: Path | None = None,
+    model: str = DEFAULT_MODEL,
     identity: str = DEFAULT_IDENTITY,
     width: int = 720,
     height: int = 576,
@@ -334,8 +349,8 @@ def draw_expressions(
     ----------
     pads : sequence of tuple of float
         Pleasure, arousal, dominance of each, from -1 to 1.
-    face_dir : Path
-        Folder of the compiled face data.
+    face_dir, models_dir
+        As in `clip_digest`.
     model, identity, width, height, intensity
         As in `ClipSpec`; odd sizes are welcome here.
 
@@ -352,16 +367,16 @@ def draw_expressions(
         If the face data are missing, or OpenGL does not start.
     """
     points = [PAD.parse(pad).as_tuple() for pad in pads]
-    _check_choice("model", model, MODEL_NAMES)
+    chosen = load_model(model, models_dir)
     strength = _real("intensity", intensity, *_REAL_RANGES["intensity"])
-    apices = np.array([_apex(point, model, strength)[1] for point in points]).reshape(-1, FAP_COUNT)
+    apices = np.array([_apex(point, chosen, strength)[1] for point in points]).reshape(-1, FAP_COUNT)
     yield from Stage(face_dir, identity).pictures(apices, width=width, height=height)
 
 
-def _apex(pad: tuple[float, float, float], model: str, intensity: float) -> tuple[Floats, Floats]:
+def _apex(pad: tuple[float, float, float], model: ExpressionModel, intensity: float) -> tuple[Floats, Floats]:
     """Return the PEPs (9,) at full expression and their FAPs (68,)."""
-    pep = intensity * load_model(model).predict(np.array([pad]))[0]
-    return pep, pep_to_fap(pep[None, :])[0]
+    pep, faps = model.apex(np.array([pad]), intensity=intensity)
+    return pep[0], faps[0]
 
 
 def _check_text(text: object) -> None:

@@ -8,8 +8,7 @@ import imageio_ffmpeg
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.expression.pad_pep import load_model
-from synth.expression.pep_fap import translation_digest
+from synth.expression.models import ExpressionModel
 from synth.face.assets import asset_digest
 from synth.render import RENDERER_VERSION
 
@@ -30,7 +29,7 @@ def picture_digests(face_dir: Path) -> dict[str, Any]:
     return {"format": FORMAT, "assets": asset_digest(face_dir), "renderer": RENDERER_VERSION}
 
 
-def digests(model: str, face_dir: Path) -> dict[str, Any]:
+def digests(model: ExpressionModel, face_dir: Path) -> dict[str, Any]:
     """Return what pictures of an expression depend on besides its PAD: `picture_digests` and the model's.
 
     Raises
@@ -39,7 +38,7 @@ def digests(model: str, face_dir: Path) -> dict[str, Any]:
         If the face data in ``face_dir`` are missing or damaged.
     """
     # A clip's identity is a digest of this text, so the order of the keys stays.
-    own = {"format": FORMAT, "model": load_model(model).digest, "pep_fap": translation_digest()}
+    own = {"format": FORMAT, "model": model.pad_pep.digest, "pep_fap": model.pep_fap.digest}
     return own | picture_digests(face_dir)
 
 

@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from synth.clip import draw_expressions
 from synth.errors import SpecError
+from synth.expression.models import DEFAULT_MODEL
 from synth.pad import PAD, emotion_words
 from synth.video import write_png
 from synth.words import look_up
@@ -105,7 +106,8 @@ def render_sheet(
     face_dir: Path,
     *,
     identities: Sequence[str],
-    model: str = "table",
+    models_dir: Path | None = None,
+    model: str = DEFAULT_MODEL,
     intensity: float = 1.0,
     columns: int | None = None,
     width: int = 360,
@@ -123,6 +125,8 @@ def render_sheet(
         Folder of the compiled face data.
     identities : sequence of str
         Whose faces; each of several begins a row.
+    models_dir
+        As in `synth.clip.clip_digest`.
     model, intensity
         As in `synth.clip.ClipSpec`.
     columns : int, optional
@@ -156,7 +160,14 @@ def render_sheet(
         for part in _rows(
             list(
                 draw_expressions(
-                    pads, face_dir, identity=identity, model=model, intensity=intensity, width=width, height=height
+                    pads,
+                    face_dir,
+                    models_dir=models_dir,
+                    identity=identity,
+                    model=model,
+                    intensity=intensity,
+                    width=width,
+                    height=height,
                 )
             ),
             across,

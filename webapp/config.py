@@ -32,6 +32,8 @@ class Settings:
         Address of a Dask scheduler (``PADLAB_SCHEDULER``); None starts a ``LocalCluster`` when there is work.
     face_dir : Path
         Folder of the compiled face data (``PADLAB_FACE_DIR``, default ``face/`` in `home`).
+    models_dir : Path
+        Folder of the sets of models made by ``padlab train`` (``PADLAB_MODELS_DIR``, default ``models/`` in `home`).
     secret_key : str
         Signs cookies (``PADLAB_SECRET_KEY``; by default made once and kept in `home`).
     """
@@ -41,6 +43,7 @@ class Settings:
     media_url: str
     scheduler: str | None
     face_dir: Path
+    models_dir: Path
     secret_key: str = field(repr=False)
 
     @classmethod
@@ -66,6 +69,7 @@ class Settings:
             media_url=env.get("PADLAB_MEDIA_URL") or str(home / "media"),
             scheduler=_scheduler(env.get("PADLAB_SCHEDULER") or None),
             face_dir=Path(env.get("PADLAB_FACE_DIR") or home / "face").expanduser().resolve(),
+            models_dir=Path(env.get("PADLAB_MODELS_DIR") or home / "models").expanduser().resolve(),
             secret_key=_given_secret(env.get("PADLAB_SECRET_KEY") or "") or _kept_secret(home / "secret_key"),
         )
 

@@ -42,20 +42,20 @@ class Outcome:
     error: str | None = None
 
 
-def render_job(job: Job, media_url: str, face_dir: str) -> Outcome:
+def render_job(job: Job, media_url: str, face_dir: str, models_dir: str) -> Outcome:
     """Render one clip into the media store unless it is there; runs on a worker, knows no database."""
     store = MediaStore(media_url)
-    folder = Path(face_dir)
+    folder, models = Path(face_dir), Path(models_dir)
 
     def make(path: Path) -> dict[str, Any]:
         assets.fetch(folder)
         spec = ClipSpec.from_dict(job.spec)
-        if clip_digest(spec, folder) != job.digest:
+        if clip_digest(spec, folder, models) != job.digest:
             raise SynthError(
                 "The models, the face data or the renderer have changed since the study was applied; "
                 "apply the study file under a new slug"
             )
-        lineage: dict[str, Any] = render_clip(spec, path, folder)
+        lineage: dict[str, Any] = render_clip(spec, path, folder, models)
         return lineage
 
     try:
@@ -121,7 +121,7 @@ class Farm:
         """Render jobs on the workers and yield each outcome as it comes; ends early when `stop` is set."""
         if self._client is None:
             raise FarmError("The farm is not open; use it in a with statement")
-        place = (self._settings.media_url, str(self._settings.face_dir))
+        place = (self._settings.media_url, str(self._settings.face_dir), str(self._settings.models_dir))
         home = hashlib.sha256("|".join(place).encode()).hexdigest()[:12]
         digests = {
             self._client.submit(render_job, job, *place, key=f"clip-{job.digest}-{home}"): job.digest for job in jobs

@@ -1,6 +1,5 @@
 """PEP to FAP and back: the key FAP follows the PEP, the others follow the key (ACII 2007, Eq. 1; MTAP 2013, Eq. 3)."""
 
-import hashlib
 import itertools
 import json
 from collections.abc import Iterator
@@ -13,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.errors import SpecError
+from synth.expression.least_squares import least_squares
 from synth.expression.pep import MTAP, Pep, check_peps, peps
+from synth.expression.samples import digest
 from synth.fap.table import FAP_COUNT, check_sequence, column, faps
 
 Floats = NDArray[np.float64]
@@ -33,14 +34,23 @@ class PepFapModel:
     plus, minus : (K, 68) float64
         The FAP values, in FAPU, at +1 and at -1 of each PEP. Positive and negative values have each their own maximum,
         as the face's reach differs (lids close farther than they open).
-    digest : str
-        Sha-256 of the numbers.
     """
 
     scheme: str
     plus: Floats
     minus: Floats
-    digest: str
+
+    def __post_init__(self) -> None:
+        shape = (len(peps(self.scheme)), FAP_COUNT)
+        for name in ("plus", "minus"):
+            values = getattr(self, name)
+            if values.shape != shape or not np.isfinite(values).all():
+                raise SpecError(f"PEP to FAP: {name} must be finite numbers of shape {shape}, not {values.shape}.")
+
+    @property
+    def digest(self) -> str:
+        """Sha-256 of the scheme and the numbers."""
+        return digest(f"pep_fap {self.scheme}", self.plus, self.minus)
 
     @classmethod
     def template(cls, scheme: str = MTAP) -> Self:
@@ -50,10 +60,12 @@ class PepFapModel:
         for k, (pep, row) in enumerate(zip(peps(scheme), rows, strict=True)):
             shares = {pep.key: 1.0} | {int(fap): share for fap, share in row["shares"].items()}
             plus[k], minus[k] = _profile(shares, row["plus"]), _profile(shares, row["minus"])
-        return cls(scheme, plus, minus, hashlib.sha256(json.dumps(rows, sort_keys=True).encode()).hexdigest())
+        return cls(scheme, plus, minus)
 
     @classmethod
-    def fit(cls, values: NDArray[np.floating] | Floats, *, scheme: str = MTAP) -> Self:
+    def fit(
+        cls, values: NDArray[np.floating] | Floats, *, scheme: str = MTAP, fallback: "PepFapModel | None" = None
+    ) -> Self:
         """Learn the translation of FAP values measured on expressions.
 
         ``alpha_j = sum_n F_j F_key / sum_n F_key^2`` (MTAP 2013, Eq. 4). Where PEPs share FAPs (the brows of ACII),
@@ -66,6 +78,8 @@ class PepFapModel:
             FAP values in FAPU of N expressions.
         scheme : str
             Which PEPs.
+        fallback : PepFapModel, optional
+            What PEPs whose key FAP never moves are taken from; without it they are an error.
 
         Raises
         ------
@@ -77,20 +91,21 @@ class PepFapModel:
         for group in _groups(scheme):
             keys = measured[:, [column(peps(scheme)[k].key) for k in group]]
             for k, key in zip(group, keys.T, strict=True):
-                if not key.any():
+                if not key.any() and fallback is None:
                     pep = peps(scheme)[k]
                     raise SpecError(
                         f"PEP {pep.code} ({pep.name}): its key FAP {pep.key} is 0 in all {len(measured)} expressions, "
                         "so nothing can be learned of it."
                     )
             columns = [column(fap) for fap in sorted({fap for k in group for fap in peps(scheme)[k].faps})]
-            shares = np.linalg.lstsq(keys, measured[:, columns], rcond=None)[0]
+            shares = least_squares(keys, measured[:, columns])
             for k, key, share in zip(group, keys.T, shares, strict=True):
                 above, below = (_one_way(share * end, columns) for end in (key.max(initial=0.0), key.min(initial=0.0)))
                 # A PEP may look up where its key FAP looks down: the template knows which way is plus.
                 plus[k, columns], minus[k, columns] = (above, below) if _key_sign(scheme, k) > 0 else (below, above)
-        text = json.dumps([scheme, plus.tolist(), minus.tolist()], separators=(",", ":"))
-        return cls(scheme, plus, minus, hashlib.sha256(text.encode()).hexdigest())
+                if not key.any() and fallback is not None:
+                    plus[k], minus[k] = fallback.plus[k], fallback.minus[k]
+        return cls(scheme, plus, minus)
 
     def translate(self, values: NDArray[np.floating] | Floats) -> Floats:
         """Return the FAPs (N, 68), in FAPU, of PEPs (N, K).
@@ -125,13 +140,14 @@ class PepFapModel:
             wanted = measured[:, columns]
             found = np.zeros(len(measured), dtype=bool)
             for signs in itertools.product((1.0, -1.0), repeat=len(group)):
-                rows = [self.plus[k] if s > 0 else -self.minus[k] for k, s in zip(group, signs, strict=True)]
-                sides = np.stack(rows)[:, columns]
+                profiles = [self.plus[k] if s > 0 else -self.minus[k] for k, s in zip(group, signs, strict=True)]
+                sides = np.stack(profiles)[:, columns]
                 if abs(np.linalg.det(sides)) < _SLACK:
                     continue
                 values_there = np.linalg.solve(sides.T, wanted.T).T
                 fits = ~found & (values_there * signs >= -_SLACK).all(axis=1)
-                result[np.ix_(fits, group)] = values_there[fits]
+                rows = np.flatnonzero(fits)
+                result[rows[:, None], group] = values_there[rows]
                 found |= fits
         return result + 0.0
 
@@ -163,11 +179,6 @@ def pep_to_fap(values: NDArray[np.floating] | Floats, scheme: str = MTAP) -> Flo
         If ``values`` is not a finite (N, K) array.
     """
     return template(scheme).translate(values)
-
-
-def translation_digest() -> str:
-    """Return the sha-256 of the template with which the avatar is animated."""
-    return template(MTAP).digest
 
 
 @cache

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.baseline import NaiveRenderer
-from synth.expression.pad_pep import load_model
-from synth.expression.pep_fap import pep_to_fap
+from synth.expression.models import load_model
 from synth.face import assets
 from synth.face.deformation import solve
 from synth.face.mesh import load_face
@@ -23,6 +22,7 @@ from synth.face.rig import Rig
 from synth.fap.table import column
 from synth.render import Renderer
 from synth.video import VideoWriter
+from webapp.cli.bench_training import train
 from webapp.cli.context import echo_json
 from webapp.config import Settings
 
@@ -41,6 +41,9 @@ _NODS = {48: (12_000, 0.31), 49: (16_000, 0.23), 50: (7_000, 0.17)}
 @click.group()
 def bench() -> None:
     """Measure how fast padlab is on this machine."""
+
+
+bench.add_command(train)
 
 
 @bench.command()
@@ -66,7 +69,7 @@ def render(as_json: bool) -> None:
 def talking(seconds: float) -> Floats:
     """Return the FAPs (T, 68) of a face that smiles, talks, blinks and turns its head a few degrees all the time."""
     at = np.arange(round(seconds * FPS)) / FPS
-    smile = pep_to_fap(load_model("table").predict(np.array([[0.55, 0.24, 0.28]])))[0]
+    smile = load_model("table").apex(np.array([[0.55, 0.24, 0.28]]))[1][0]
     faps: Floats = (0.5 + 0.3 * np.sin(2 * np.pi * 0.4 * at))[:, None] * smile
     loud = 0.6 + 0.4 * np.sin(2 * np.pi * 0.9 * at)
     jaw = loud * np.maximum(0.0, np.sin(2 * np.pi * _MOUTHS_PER_SECOND * at))

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from synth.expression.pad_pep import MODEL_NAMES
 from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES, find_identity
 from synth.sheet import expressions, render_sheet
 from webapp.cli.context import echo_json
-from webapp.cli.options import FILE, SizeType, check_out, end_on_signals, face_dir
+from webapp.cli.options import FILE, SizeType, check_out, end_on_signals, face_dir, model_option
+from webapp.config import Settings
 
 
 @click.command()
@@ -29,9 +29,7 @@ def identities(as_json: bool) -> None:
 @click.command()
 @click.argument("words", metavar="WORD…", nargs=-1, required=True)
 @click.option("--out", type=FILE, required=True, help="The sheet (PNG).")
-@click.option(
-    "--model", type=click.Choice(MODEL_NAMES), default="table", show_default=True, help="From PAD to expression."
-)
+@model_option
 @click.option(
     "--identity",
     "chosen",
@@ -60,7 +58,8 @@ def faces(
     """Draw expressions as a labelled sheet.
 
     WORD is one of the papers' fourteen emotion words, one of the six basic emotions (joy, anger, sadness, surprise,
-    fear, disgust) or neutral; "basic" stands for the six, "all" for the fourteen.
+    fear, disgust), neutral, or any other word that `padlab words` knows; "basic" stands for the six, "all" for the
+    fourteen.
     """
     end_on_signals()
     check_out(out, ".png")
@@ -73,6 +72,7 @@ def faces(
         face_dir(),
         identities=chosen,
         model=model,
+        models_dir=Settings.from_env().models_dir,
         intensity=intensity,
         columns=columns,
         width=size[0],

@@ -22,12 +22,16 @@ COMMANDS = {
     "face": "webapp.cli.synthesis:face",
     "faces": "webapp.cli.faces:faces",
     "fap": "webapp.cli.fap:fap",
+    "head": "webapp.cli.head:head",
     "identities": "webapp.cli.faces:identities",
+    "models": "webapp.cli.models:models",
     "report": "webapp.cli.results:report",
     "say": "webapp.cli.synthesis:say",
     "serve": "webapp.cli.serve:serve",
     "study": "webapp.cli.study:study",
+    "train": "webapp.cli.models:train",
     "user": "webapp.cli.user:user",
+    "words": "webapp.cli.words:words",
 }
 EXIT_FAILURE = 1
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import click
 
+from synth.errors import SynthError
+from synth.expression.models import DEFAULT_MODEL, MODEL_NAMES, check_model_name
 from synth.face import assets
 from synth.face.identity import DEFAULT_IDENTITY
 from webapp.config import Settings
@@ -33,6 +35,35 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 identity_option = click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
 size_option = click.option(
     "--size", type=SizeType(), default="720x576", show_default=True, help="Size of the picture in pixels."
+)
+
+
+class ModelType(click.ParamType[str]):
+    """The name of a model, or one of some more words."""
+
+    name = "model"
+
+    def __init__(self, *others: str) -> None:
+        self._others = others
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Check a name; whether the set that it names exists is found when it is loaded."""
+        if value in self._others:
+            return str(value)
+        try:
+            return check_model_name(value)
+        except SynthError as error:
+            also = f" (or {', '.join(self._others)})" if self._others else ""
+            self.fail(f"{error}{also}", param, ctx)
+
+
+model_option = click.option(
+    "--model",
+    type=ModelType(),
+    default=DEFAULT_MODEL,
+    show_default=True,
+    metavar="NAME",
+    help=f"From PAD to expression: {', '.join(MODEL_NAMES)}, or SET/KIND of a set made by `padlab train`.",
 )
 
 

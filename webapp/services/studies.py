@@ -49,7 +49,7 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
             f"The study '{spec.slug}' has participants and cannot be changed; give the changed file a new slug"
         )
     wanted = clip_specs(spec, text, source=spec.slug)
-    digests = {cell: clip_digest(clip, settings.face_dir) for cell, clip in wanted.items()}
+    digests = {cell: clip_digest(clip, settings.face_dir, settings.models_dir) for cell, clip in wanted.items()}
     if study is not None and study.digest == spec.digest:
         applied = [stimulus.clip.digest for stimulus in study.stimuli]
         if applied == list(digests.values()):

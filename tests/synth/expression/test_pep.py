@@ -53,7 +53,7 @@ def test_acii_table_2():
     # The paper names the left key of each pair, and the FAPs of both sides together.
     found = {}
     for pep in peps(ACII):
-        key, group = found.setdefault(pep.code.rstrip("LR"), (pep.key, set()))
+        _, group = found.setdefault(pep.code.rstrip("LR"), (pep.key, set()))
         group.update(pep.faps)
     assert found == ACII_TABLE_2
     assert len(peps(ACII)) == 18

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from synth.errors import SpecError
 from synth.expression.pep import ACII, MTAP, codes, peps
-from synth.expression.pep_fap import PepFapModel, pep_to_fap, template, translation_digest
+from synth.expression.pep_fap import PepFapModel, pep_to_fap, template
 from synth.fap.table import column, faps, mirrored
 
 values = st.lists(st.floats(-1.0, 1.0), min_size=9, max_size=9).map(lambda row: np.array([row]))
@@ -81,8 +81,11 @@ def test_neutral_is_all_zero():
     assert not pep_to_fap(np.zeros((2, 9))).any()
 
 
-def test_the_digest_is_a_digest():
-    assert len(translation_digest()) == 64
+def test_the_digest_tells_translations_apart():
+    own = template()
+    other = PepFapModel(own.scheme, own.plus, 1.01 * own.minus)
+    assert len(own.digest) == 64
+    assert len({own.digest, other.digest, template(ACII).digest}) == 3
 
 
 def test_one_way_faps_go_one_way():
@@ -169,5 +172,5 @@ def test_alpha_is_equation_4():
 def test_a_key_that_never_moves_is_named():
     measured = np.ones((5, 68))
     measured[:, column(12)] = 0.0
-    with pytest.raises(SpecError, match="PEP 8.*key FAP 12"):
+    with pytest.raises(SpecError, match=r"PEP 8.*key FAP 12"):
         PepFapModel.fit(measured)

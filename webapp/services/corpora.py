@@ -1,0 +1,206 @@
+"""Where training data come from: the pseudo database, a folder of landmarks, or a study of this platform."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from sqlalchemy.orm import Session
+
+from evaluation.errors import EvaluationError
+from evaluation.responses import DIMENSIONS, check_responses, score_trials
+from evaluation.seeding import generator
+from evaluation.simulate import annotate_incrementally
+from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
+from synth.clip import ClipSpec
+from synth.corpus.expressions import ExpressionSet
+from synth.corpus.landmarks import read_set
+from synth.corpus.pseudo import generate
+from synth.expression.fitting import Samples
+from synth.expression.models import load_model
+from synth.expression.pep import ACII, MTAP
+from synth.stage import Stage
+from webapp.config import Settings
+from webapp.db import Database
+from webapp.errors import ConflictError, NotFoundError
+from webapp.services import results, studies
+
+Floats = NDArray[np.float64]
+
+PSEUDO = "pseudo"
+STUDY_PREFIX = "study:"
+
+PSEUDO_IDENTITIES = ("amara", "erik", "mei", "wei")
+"""Whose faces the pseudo database has: two women and two men, of three ethnicities."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Corpus:
+    """Annotated expressions, as the models take them and as they were measured.
+
+    Attributes
+    ----------
+    samples : Samples
+        What the models of MTAP 2013 are trained on.
+    expressions : ExpressionSet or None
+        The measured expressions; None for a study, whose clips' FAPs are known without measuring.
+    acii : ExpressionSet or None
+        The expressions for the evaluation of ACII 2007.
+    agreement : AnnotationAgreement or None
+        Agreement of the raters where it is known.
+    """
+
+    samples: Samples
+    expressions: ExpressionSet | None = None
+    acii: ExpressionSet | None = None
+    agreement: AnnotationAgreement | None = None
+
+
+def load(reference: str, settings: Settings, *, seed: int) -> Corpus:
+    """Return the corpus that a reference names.
+
+    Parameters
+    ----------
+    reference : str
+        "pseudo", "study:SLUG", or the path of a folder (see docs/corpora.md).
+    settings : Settings
+        Where faces, models and the database are.
+    seed : int
+        Seed of the pseudo database and its annotation.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such folder or study.
+    ConflictError
+        If the study has too few rated faces.
+    SynthError
+        If the folder's files are not what they should be.
+    """
+    if reference == PSEUDO:
+        return pseudo(settings, seed=seed)
+    if reference.startswith(STUDY_PREFIX):
+        database = Database(settings.database_url)
+        database.require_current()
+        with database.read() as session:
+            return Corpus(samples=of_study(session, reference.removeprefix(STUDY_PREFIX), settings))
+    folder = Path(reference)
+    if not folder.is_dir():
+        raise NotFoundError(
+            f"There is no folder {reference}; --data takes a folder, '{PSEUDO}' or '{STUDY_PREFIX}SLUG'"
+        )
+    found = read_set(folder)
+    return Corpus(samples=samples_of(found), expressions=found, acii=found)
+
+
+def pseudo(settings: Settings, *, seed: int) -> Corpus:
+    """Make the pseudo databases of both papers' sizes and have them annotated by simulated raters."""
+    rigs = {name: Stage(settings.face_dir, name).rig for name in PSEUDO_IDENTITIES}
+    sets = {}
+    for kind in (MTAP, ACII):
+        expressions, true_pad = generate(kind, rigs, seed=seed)
+        rated = annotate_incrementally(true_pad, rng=generator(seed, "pseudo annotation", kind))
+        sets[kind] = expressions.with_pad(rated.pad), rated.agreement
+    (mtap, agreement), (acii, _) = sets[MTAP], sets[ACII]
+    samples = samples_of(mtap, reliability=reliability(agreement))
+    return Corpus(samples=samples, expressions=mtap, acii=acii, agreement=agreement)
+
+
+def reliability(agreement: AnnotationAgreement) -> Floats:
+    """Return the reliability (3,) of P, A and D, means over the raters: ``k r / (1 + (k - 1) r)``, r mean pairwise.
+
+    Source: Spearman 1910 and Brown 1910, British Journal of Psychology 3:271 and 3:296. A mean correlation of 0 or
+    less counts as no reliability.
+    """
+    parts = [agreement[dimension] for dimension in DIMENSIONS]
+    r = np.array([max(0.0, part.pairwise_r or 0.0) for part in parts])
+    k = np.array([part.raters for part in parts])
+    return k * r / (1.0 + (k - 1.0) * r)
+
+
+def samples_of(expressions: ExpressionSet, *, reliability: Floats | None = None) -> Samples:
+    """Return annotated expressions as the models take them.
+
+    Raises
+    ------
+    NotFoundError
+        If they are not annotated.
+    """
+    if expressions.pad is None:
+        raise NotFoundError(f"The expressions {expressions.name} have no PAD annotation; add pad.csv to their folder")
+    return Samples(
+        name=expressions.name,
+        faps=expressions.faps,
+        pad=expressions.pad,
+        emotions=expressions.emotions,
+        note=expressions.note,
+        pseudo=expressions.pseudo,
+        digest=expressions.digest,
+        reliability=reliability,
+    )
+
+
+def of_study(session: Session, slug: str, settings: Settings) -> Samples:
+    """Return the faces that a study shows, with the mean PAD that its participants gave each (MTAP 2013, Eq. 13).
+
+    The FAPs are those that the clips' models made, at the apex. Faces of equal PEPs (a word in two conditions, say)
+    stay apart, as they were rated apart.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such study.
+    ConflictError
+        If it does not ask the 12-item PAD questionnaire, or no face has been rated.
+    """
+    study = studies.find(session, slug)
+    spec = studies.spec_of(study)
+    if "pad12" not in spec.instruments:
+        raise ConflictError(f"The study '{slug}' does not ask pad12, so it holds no PAD to learn from")
+    scores = score_trials(spec, check_responses(spec, results.responses(session, slug)))
+    answered = scores.dropna(subset=list(DIMENSIONS))
+    by_cell = answered.groupby(["stimulus", "condition"])[list(DIMENSIONS)].mean()
+    means = dict(zip(by_cell.index, by_cell.to_numpy(dtype=np.float64), strict=True))
+    clips = {
+        (stimulus.name, stimulus.condition.name): ClipSpec.from_dict(stimulus.clip.spec) for stimulus in study.stimuli
+    }
+    rated = [cell for cell in clips if cell in means]
+    if not rated:
+        raise ConflictError(f"The study '{slug}' has no rated face yet; train when participants have answered")
+    faps = np.array([_apex(clips[cell], settings) for cell in rated])
+    pad = np.array([means[cell] for cell in rated])
+    return Samples(
+        name=f"{STUDY_PREFIX}{slug}",
+        faps=faps,
+        pad=pad,
+        emotions=tuple(stimulus for stimulus, _ in rated),
+        note=f"PAD of {len(rated)} faces, mean over {answered['participant'].nunique()} raters in the study {slug}.",
+        digest=_digest(rated, faps, pad),
+        reliability=_reliability(answered),
+    )
+
+
+def _reliability(scores: pd.DataFrame) -> Floats | None:
+    """Return the reliability of the mean ratings, or None where not everybody has rated every face."""
+    raters = list(scores["participant"].unique())
+    wide = scores.pivot_table(index=["stimulus", "condition"], columns="participant", values=list(DIMENSIONS))
+    ratings = np.stack([wide[name].reindex(columns=raters).to_numpy(dtype=np.float64) for name in DIMENSIONS], axis=2)
+    try:
+        return reliability(annotation_agreement(ratings))
+    except EvaluationError:
+        return None
+
+
+def _apex(spec: ClipSpec, settings: Settings) -> Floats:
+    _, faps = load_model(spec.model, settings.models_dir).apex(np.array([spec.pad]), intensity=spec.intensity)
+    apex: Floats = faps[0]
+    return apex
+
+
+def _digest(cells: Sequence[tuple[str, str]], faps: Floats, pad: Floats) -> str:
+    content = [list(cells), np.round(faps, 6).tolist(), np.round(pad, 6).tolist()]
+    return hashlib.sha256(json.dumps(content, separators=(",", ":")).encode()).hexdigest()
