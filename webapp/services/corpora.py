@@ -119,7 +119,8 @@ def reliability(agreement: AnnotationAgreement) -> Floats:
     parts = [agreement[dimension] for dimension in DIMENSIONS]
     r = np.array([max(0.0, part.pairwise_r or 0.0) for part in parts])
     k = np.array([part.raters for part in parts])
-    return k * r / (1.0 + (k - 1.0) * r)
+    result: Floats = k * r / (1.0 + (k - 1.0) * r)
+    return result
 
 
 def samples_of(expressions: ExpressionSet, *, reliability: Floats | None = None) -> Samples:
@@ -186,9 +187,11 @@ def of_study(session: Session, slug: str, settings: Settings) -> Samples:
 
 def _reliability(scores: pd.DataFrame) -> Floats | None:
     """Return the reliability of the mean ratings, or None where not everybody has rated every face."""
-    raters = list(scores["participant"].unique())
-    wide = scores.pivot_table(index=["stimulus", "condition"], columns="participant", values=list(DIMENSIONS))
-    ratings = np.stack([wide[name].reindex(columns=raters).to_numpy(dtype=np.float64) for name in DIMENSIONS], axis=2)
+    by_rater = [
+        scores.pivot(index=["stimulus", "condition"], columns="participant", values=name).to_numpy(dtype=np.float64)
+        for name in DIMENSIONS
+    ]
+    ratings = np.stack(by_rater, axis=2)
     try:
         return reliability(annotation_agreement(ratings))
     except EvaluationError:
