@@ -5,6 +5,7 @@ from synth.corpus.facs import emotion_displays
 from synth.corpus.portrayal import (
     BLENDS,
     FEW_UNITS,
+    WORD_SCALE,
     acii_counts,
     emotion_shares,
     neutral,
@@ -47,12 +48,12 @@ def test_numbers_of_table_4():
 @pytest.mark.parametrize("word", emotion_words())
 def test_a_word_at_full_strength_has_its_pad(word):
     shown = of_word(word, 1.0)
-    np.testing.assert_allclose(true_pad(shown, shown.faps), emotion_words()[word].as_tuple(), atol=1e-9)
+    np.testing.assert_allclose(true_pad(shown, shown.faps), WORD_SCALE * np.array(emotion_words()[word].as_tuple()), atol=1e-9)
 
 
 @pytest.mark.parametrize("word", ["Happy", "Hostile", "Boring"])
 def test_strength_leads_from_neutral_to_the_word(word):
-    full = np.array(emotion_words()[word].as_tuple())
+    full = WORD_SCALE * np.array(emotion_words()[word].as_tuple())
     half = of_word(word, 0.5)
     np.testing.assert_allclose(true_pad(half, half.faps), (full + NEUTRAL) / 2, atol=1e-9)
 
