@@ -1,10 +1,40 @@
-"""Files that appear complete or not at all."""
+"""Text files that are read, and files that appear complete or not at all."""
 
 import contextlib
 import secrets
 from pathlib import Path
 
-from synth.errors import VideoError
+from synth.errors import SpecError, VideoError
+
+
+def read_text(path: Path, right: str) -> str:
+    """Return the text of a file in UTF-8, without a byte order mark.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    right : str
+        What would be right if it is not UTF-8, for the message.
+
+    Raises
+    ------
+    SpecError
+        If it is not UTF-8; the message names the file and the line.
+    OSError
+        If it cannot be read.
+    """
+    content = path.read_bytes()
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SpecError(f"{path}, line {line}: is not UTF-8 text; {right}.") from None
+
+
+def shown(text: str) -> str:
+    """Return a piece of a file for a message: quoted, and not longer than a line bears."""
+    return repr(text if len(text) <= 24 else text[:24] + "…")
 
 
 def write_whole(path: Path, content: bytes | str) -> None:

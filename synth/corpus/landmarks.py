@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.corpus.expressions import SCHEMES, ExpressionSet
-from synth.corpus.table_file import Row, TableFile
+from synth.csv_file import Header, Row, read_csv
 from synth.errors import SpecError
 from synth.expression.measurement import ACII_POINTS, HUMAN_EYEBALL, MAX_COORDINATE, Landmarks
 from synth.expression.pep import ACII, MTAP
@@ -57,7 +57,10 @@ NEUTRAL, APEX = "neutral", "apex"
 
 _IDS = ("sample", "subject", "emotion", "state")
 _DISPLAY = "display"
+_COLUMNS = f"{','.join(_IDS)}, perhaps {_DISPLAY}, and the coordinates of feature points such as 4.1.x and 4.1.y"
 _POINT = re.compile(r"(\d{1,2}\.\d{1,2})\.([xyz])")
+_PAD_COLUMNS = ("sample", "rater", "P", "A", "D")
+_ROUND = "round"
 
 
 def read_set(folder: Path, *, scheme: str | None = None) -> ExpressionSet:
@@ -79,10 +82,10 @@ def read_set(folder: Path, *, scheme: str | None = None) -> ExpressionSet:
         If a file cannot be read.
     """
     about = _read_about(folder / ABOUT_FILE)
-    table = TableFile(folder / LANDMARKS_FILE)
-    points = _points_of(table, folder / LANDMARKS_FILE)
-    chosen = _scheme_for(points, scheme or about.scheme, folder / LANDMARKS_FILE)
-    shown = _read_shown(table, points, folder / LANDMARKS_FILE, y_up=about.y_up)
+    header, rows = read_csv(folder / LANDMARKS_FILE, _IDS, expected=_COLUMNS)
+    points = _points_of(header)
+    chosen = _scheme_for(points, scheme or about.scheme, header)
+    shown = _read_shown(rows, points, y_up=about.y_up)
     try:
         result = ExpressionSet.measure(
             Landmarks(points, np.array(shown.neutral), np.array(shown.apex)),
@@ -131,7 +134,7 @@ def write_set(expressions: ExpressionSet, folder: Path) -> None:
     if expressions.pad is not None:
         ratings = zip(expressions.samples, expressions.pad.tolist(), strict=True)
         values = [[sample, "mean", *map(repr, pad)] for sample, pad in ratings]
-        write_whole(folder / PAD_FILE, _csv([["sample", "rater", "P", "A", "D"], *values]))
+        write_whole(folder / PAD_FILE, _csv([_PAD_COLUMNS, *values]))
     else:
         # Ratings of an older set of this name must not be taken for this one's.
         (folder / PAD_FILE).unlink(missing_ok=True)
@@ -157,24 +160,16 @@ class _Shown:
     apex: list[Floats]
 
 
-def _points_of(table: TableFile, path: Path) -> tuple[str, ...]:
-    """Return the points that a table's header names, in order."""
-    table.require(_IDS)
-    points: dict[str, None] = {}
-    for name in table.columns:
-        match = _POINT.fullmatch(name)
-        if match:
-            points[match[1]] = None
-        elif name not in {*_IDS, _DISPLAY}:
-            raise SpecError(
-                f"{path}, line 1, column {name}: there is no such column; there are {', '.join(_IDS)}, {_DISPLAY}, and "
-                "the coordinates of feature points such as 4.1.x and 4.1.y."
-            )
-    table.require([f"{point}.{axis}" for point in points for axis in "xy"])
-    return tuple(points)
+def _points_of(header: Header) -> tuple[str, ...]:
+    """Return the points that a file's header names, in order."""
+    points = {name: match[1] for name in header.columns if (match := _POINT.fullmatch(name))}
+    header.permit({*_IDS, _DISPLAY, *points})
+    found = tuple(dict.fromkeys(points.values()))
+    header.require([f"{point}.{axis}" for point in found for axis in "xy"])
+    return found
 
 
-def _scheme_for(points: Iterable[str], wanted: str | None, path: Path) -> str:
+def _scheme_for(points: Iterable[str], wanted: str | None, header: Header) -> str:
     given = set(points)
     if wanted is not None and wanted not in SCHEMES:
         raise SpecError(f"Expressions: there is no scheme {wanted!r}; there are {', '.join(SCHEMES)}.")
@@ -182,34 +177,36 @@ def _scheme_for(points: Iterable[str], wanted: str | None, path: Path) -> str:
     complete = [scheme for scheme, absent in missing.items() if not absent]
     if not complete:
         scheme, absent = min(missing.items(), key=lambda item: len(item[1]))
-        raise SpecError(
-            f"{path}, line 1: the points {', '.join(absent)} are missing, which {scheme} needs; add their columns, for "
-            f"instance {absent[0]}.x and {absent[0]}.y."
+        raise header.fault(
+            f"the points {', '.join(absent)} are missing, which {scheme} needs",
+            f"add their columns, for instance {absent[0]}.x and {absent[0]}.y",
         )
     return complete[0]
 
 
-def _read_shown(table: TableFile, points: tuple[str, ...], path: Path, *, y_up: bool) -> _Shown:
+def _read_shown(rows: list[Row], points: tuple[str, ...], *, y_up: bool) -> _Shown:
     """Read the expressions, each with its own neutral face or, if it has none, the mean of its subject's."""
     up = 1.0 if y_up else -1.0
     faces: dict[tuple[str, str], tuple[Row, Floats]] = {}
     of_subject: dict[str, list[Floats]] = defaultdict(list)
-    for row in table.rows():
+    for row in rows:
         sample, subject, state = row.name("sample"), row.name("subject"), row.name("state")
         if state not in {NEUTRAL, APEX}:
-            raise row.fault("state", f"the state is {state!r}", f"it must be {NEUTRAL} or {APEX}")
+            raise row.fault(f"the state is {state!r}", f"it must be {NEUTRAL} or {APEX}", column="state")
         for other in (NEUTRAL, APEX):
             earlier = faces.get((sample, other))
             if earlier and other == state:
-                raise row.fault("sample", f"{sample} has a second {state} face", "each sample has one of each state")
+                raise row.fault(
+                    f"{sample} has a second {state} face", "each sample has one of each state", column="sample"
+                )
             if earlier and earlier[0].text("subject") != subject:
                 raise row.fault(
-                    "subject",
                     f"{subject} shows {sample}, too",
                     f"line {earlier[0].line} says that it is of {earlier[0].text('subject')}",
+                    column="subject",
                 )
         places = np.array(
-            [[row.number(f"{point}.{axis}", largest=MAX_COORDINATE) for axis in "xy"] for point in points]
+            [[row.number(f"{point}.{axis}", -MAX_COORDINATE, MAX_COORDINATE) for axis in "xy"] for point in points]
         )
         places *= (1.0, up)
         faces[sample, state] = row, places
@@ -223,7 +220,9 @@ def _read_shown(table: TableFile, points: tuple[str, ...], path: Path, *, y_up: 
         own = faces.get((sample, NEUTRAL))
         if own is None and not of_subject[subject]:
             raise row.fault(
-                "state", f"{sample} has no neutral face, nor has its subject {subject}", "add a row with state neutral"
+                f"{sample} has no neutral face, nor has its subject {subject}",
+                f"add a row with state {NEUTRAL}",
+                column="state",
             )
         shown.samples.append(sample)
         shown.subjects.append(subject)
@@ -232,32 +231,29 @@ def _read_shown(table: TableFile, points: tuple[str, ...], path: Path, *, y_up: 
         shown.neutral.append(own[1] if own else np.mean(of_subject[subject], axis=0))
         shown.apex.append(places)
     if not shown.samples:
-        raise SpecError(f"{path}: there is no expressive face; add rows with state {APEX}.")
+        raise SpecError(f"{rows[0].path}: there is no expressive face; add rows with state {APEX}.")
     return shown
 
 
 def _read_pad(path: Path, samples: list[str]) -> Floats:
     """Return the PAD (N, 3): each rater's mean over rounds, then the mean over raters."""
-    table = TableFile(path)
-    table.require(("sample", "rater", "P", "A", "D"))
-    for name in table.columns:
-        if name not in {"sample", "rater", "round", "P", "A", "D"}:
-            raise SpecError(
-                f"{path}, line 1, column {name}: there is no such column; there are sample, rater, round, P, A, D."
-            )
+    header, rows = read_csv(path, _PAD_COLUMNS, expected=f"{','.join(_PAD_COLUMNS)} and perhaps {_ROUND}")
+    header.permit({*_PAD_COLUMNS, _ROUND})
     known = set(samples)
     seen: dict[tuple[str, str, str], int] = {}
     ratings: dict[str, dict[str, list[list[float]]]] = defaultdict(lambda: defaultdict(list))
-    for row in table.rows():
-        sample, rater, turn = row.name("sample"), row.name("rater"), row.text("round")
+    for row in rows:
+        sample, rater, turn = row.name("sample"), row.name("rater"), row.text(_ROUND)
         if sample not in known:
-            raise row.fault("sample", f"there is no sample {sample}", f"{LANDMARKS_FILE} names the samples")
+            raise row.fault(f"there is no sample {sample}", f"{LANDMARKS_FILE} names the samples", column="sample")
         earlier = seen.setdefault((sample, rater, turn), row.line)
         if earlier != row.line:
             raise row.fault(
-                "rater", f"{rater} rates {sample} again, as in line {earlier}", "number the rounds in the column round"
+                f"{rater} rates {sample} again, as in line {earlier}",
+                f"number the rounds in the column {_ROUND}",
+                column="rater",
             )
-        ratings[sample][rater].append([row.number(name, largest=1.0) for name in "PAD"])
+        ratings[sample][rater].append([row.number(name, -1.0, 1.0) for name in "PAD"])
     unrated = next((sample for sample in samples if sample not in ratings), None)
     if unrated is not None:
         raise SpecError(f"{path}: the sample {unrated} has no rating; rate it, or leave it out of {LANDMARKS_FILE}.")

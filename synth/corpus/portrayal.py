@@ -31,6 +31,7 @@ from synth.expression.pep import MTAP, codes
 from synth.expression.pep_fap import pep_to_fap, template
 from synth.expression.word_table import word_table
 from synth.fap.table import FAP_COUNT
+from synth.words import find_norm
 
 Floats = NDArray[np.float64]
 
@@ -131,7 +132,7 @@ def of_word(word: str, strength: float) -> Portrayal:
     """Return the face of one of the papers' fourteen words, as padlab's table has it."""
     words, _, faces = word_table()
     face = pep_to_fap(strength * faces[words.index(word)][None])[0]
-    return Portrayal(WORD_EMOTIONS.get(word, word.lower()), f"word {word}", face, {word: 1.0})
+    return Portrayal(_emotion(word), f"word {word}", face, {word: 1.0})
 
 
 def true_pad(portrayal: Portrayal, shown: Floats) -> Floats:
@@ -182,7 +183,13 @@ def _references() -> tuple[Mapping[str, Floats], Mapping[str, Floats]]:
 
 @cache
 def _means() -> Mapping[str, Floats]:
-    return MappingProxyType({name: np.array(mean) for name, mean in _data()["means"].items()})
+    """Return the published mean PAD (3,) of faces by the emotion they were to show."""
+    published = find_norm("acii2007-jaffe").words
+    return MappingProxyType({_emotion(word): np.array(mean.as_tuple()) for word, mean in published.items()})
+
+
+def _emotion(word: str) -> str:
+    return WORD_EMOTIONS.get(word, word.lower())
 
 
 def _face(levels: Levels) -> Floats:

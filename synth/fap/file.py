@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from synth.errors import SpecError
 from synth.fap.table import FAP_COUNT, check_sequence, column, faps
-from synth.files import write_whole
+from synth.files import read_text, shown, write_whole
 
 Floats = NDArray[np.float64]
 Masks = NDArray[np.bool_]
@@ -150,13 +150,8 @@ class _Lines:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        content = path.read_bytes()
-        try:
-            text = content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            self.number = content.count(b"\n", 0, error.start) + 1
-            raise self.fault("is not UTF-8 text", "a FAP file is plain text") from None
         self.number = 0
+        text = read_text(path, "a FAP file is plain text")
         self._rest = self._meaningful(re.split(r"\r\n|\r|\n", text))
 
     def _meaningful(self, lines: list[str]) -> Iterator[str]:
@@ -194,13 +189,13 @@ def _header(lines: _Lines) -> tuple[str, int, int, float]:
         raise lines.fault(f"has {len(parts)} fields", right)
     version, name, fps, frames = parts
     if version not in _STEPS_OF_VERSION:
-        raise lines.fault(f"the version is {_shown(version)}", f"it must be one of {', '.join(_STEPS_OF_VERSION)}")
+        raise lines.fault(f"the version is {shown(version)}", f"it must be one of {', '.join(_STEPS_OF_VERSION)}")
     if not name.isprintable():
         raise lines.fault("the name holds control characters", right)
     if not _WHOLE.fullmatch(fps) or not 1 <= int(fps) <= MAX_RATE:
-        raise lines.fault(f"the frame rate is {_shown(fps)}", f"it must be a whole number from 1 to {MAX_RATE}")
+        raise lines.fault(f"the frame rate is {shown(fps)}", f"it must be a whole number from 1 to {MAX_RATE}")
     if not _WHOLE.fullmatch(frames) or int(frames) < 1:
-        raise lines.fault(f"the number of frames is {_shown(frames)}", "it must be a whole number, 1 or more")
+        raise lines.fault(f"the number of frames is {shown(frames)}", "it must be a whole number, 1 or more")
     return name, int(fps), int(frames), _STEPS_OF_VERSION[version]
 
 
@@ -217,7 +212,7 @@ def _masks(lines: _Lines, frame: int, frames: int) -> Masks:
         )
     wrong = next((mask for mask in masks if mask not in {"0", "1"}), None)
     if wrong is not None:
-        raise lines.fault(f"a mask of frame {frame} is {_shown(wrong)}", "masks are 0 or 1")
+        raise lines.fault(f"a mask of frame {frame} is {shown(wrong)}", "masks are 0 or 1")
     return np.array([mask == "1" for mask in masks])
 
 
@@ -228,7 +223,7 @@ def _values(lines: _Lines, frame: int, mask: Masks) -> Floats:
         raise lines.fault(f"frame {frame} has masks but no values", "a line with its number and values must follow")
     fields = _fields(line)
     if fields[0] != str(frame):
-        raise lines.fault(f"the frame's number is {_shown(fields[0])}", f"it must be {frame}; numbers count from 0")
+        raise lines.fault(f"the frame's number is {shown(fields[0])}", f"it must be {frame}; numbers count from 0")
     wanted = int(mask.sum())
     if len(fields) - 1 != wanted:
         high = " (one for each of FAP 1 and 2, too)" if mask[[column(fap) for fap in _HIGH_LEVEL]].any() else ""
@@ -237,15 +232,15 @@ def _values(lines: _Lines, frame: int, mask: Masks) -> Floats:
         )
     if not _NUMBERS.fullmatch(line):
         wrong = next(field for field in fields if not _NUMBERS.fullmatch(field))
-        raise lines.fault(f"{_shown(wrong)} is no number", "values are decimal numbers such as 120 or -3.5")
+        raise lines.fault(f"{shown(wrong)} is no number", "values are decimal numbers such as 120 or -3.5")
     try:
         values = np.array([float(field) for field in fields[1:]])
     except ValueError:
         wrong = next(field for field in fields if not _is_number(field))
-        raise lines.fault(f"{_shown(wrong)} is no number", "values are decimal numbers such as 120 or -3.5") from None
+        raise lines.fault(f"{shown(wrong)} is no number", "values are decimal numbers such as 120 or -3.5") from None
     if not (np.abs(values) <= MAX_VALUE).all():
         wrong = fields[1 + int(np.argmax(~(np.abs(values) <= MAX_VALUE)))]
-        raise lines.fault(f"the value {_shown(wrong)} is too large", f"values go from -{MAX_VALUE:g} to {MAX_VALUE:g}")
+        raise lines.fault(f"the value {shown(wrong)} is too large", f"values go from -{MAX_VALUE:g} to {MAX_VALUE:g}")
     return values
 
 
@@ -260,11 +255,6 @@ def _is_number(field: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _shown(field: str) -> str:
-    """Return a field for a message: quoted, and not longer than a line bears."""
-    return repr(field if len(field) <= 24 else field[:24] + "…")
 
 
 def _follow_twins(values: Floats, masks: Masks) -> None:

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from synth.csv_file import Row, read_csv
 from synth.errors import SpecError
-from synth.files import write_whole
-from synth.head.csv_file import Row, read_rows, shown
+from synth.files import shown, write_whole
 from synth.head.words import ProsodicWord, Syllable, check_words, evenly, first_frame
 
 COLUMNS = ("text", "start", "end", "P", "A", "syllables")
@@ -88,16 +88,13 @@ def read_words(path: Path, *, fps: float) -> tuple[ProsodicWord, ...]:
     OSError
         If the file cannot be read.
     """
-    columns, rows = read_rows(path, ("text", "P", "A", "syllables"), what="word", usual=COLUMNS)
-    in_seconds = {name for name, seconds in SECONDS.items() if seconds in columns}
+    header, rows = read_csv(path, ("text", "P", "A", "syllables"), expected=",".join(COLUMNS))
+    in_seconds = {name for name, seconds in SECONDS.items() if seconds in header.columns}
     for name, seconds in SECONDS.items():
-        if name in columns and seconds in columns:
-            raise SpecError(f"{path}, line 1: there are both {name} and {seconds}; give frames or seconds.")
-        if name not in columns and seconds not in columns:
-            raise SpecError(
-                f"{path}, line 1: there is no column {name} (in frames) or {seconds}; "
-                f"the first line must name the columns {','.join(COLUMNS)}."
-            )
+        if name in header.columns and seconds in header.columns:
+            raise header.fault(f"there are both {name} and {seconds}", "give frames or seconds")
+        if name not in header.columns and seconds not in header.columns:
+            raise header.fault(f"there is no column {name} (in frames) or {seconds}")
     words: list[ProsodicWord] = []
     for row in rows:
         words.append(_word(row, fps, in_seconds))
@@ -137,13 +134,13 @@ def _word(row: Row, fps: float, in_seconds: set[str]) -> ProsodicWord:
         for name in ("start", "end")
     )
     P, A = (row.number(name, -1.0, 1.0) for name in ("P", "A"))
-    if not row.fields["text"]:
-        raise row.fault("text is empty", "it must hold the word; silence has no line")
+    if not row.text("text"):
+        raise row.fault("the field is empty", "it must hold the word; silence has no line", column="text")
     if end_s <= start_s:
         raise row.fault("the word ends where it starts or before", "end must be greater than start")
     try:
-        parts = [SyllableText.parse(written) for written in row.fields["syllables"].split()]
-        return ProsodicWord(row.fields["text"], start_s, end_s, P, A, _syllables(parts, start_s, end_s, fps))
+        parts = [SyllableText.parse(written) for written in row.text("syllables").split()]
+        return ProsodicWord(row.text("text"), start_s, end_s, P, A, _syllables(parts, start_s, end_s, fps))
     except SpecError as error:
         raise SpecError(f"{row.path}, line {row.line}: {error}") from None
 

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from numpy.typing import NDArray
 
+from synth.csv_file import Row, read_csv
 from synth.errors import SpecError
 from synth.files import write_whole
-from synth.head.csv_file import Row, read_rows
 from synth.head.published import AXES
 
 Floats = NDArray[np.float64]
@@ -68,7 +68,7 @@ def read_angles(path: Path) -> AngleTrack:
     OSError
         If the file cannot be read.
     """
-    _, rows = read_rows(path, ("frame", *AXES), what="frame")
+    _, rows = read_csv(path, ("frame", *AXES))
     first = _first(rows)
     return AngleTrack(first, np.array([[row.number(axis, -180.0, 180.0) for axis in AXES] for row in rows]))
 
@@ -105,17 +105,12 @@ def read_points(path: Path, names: Sequence[str]) -> PointTrack:
     OSError
         If the file cannot be read.
     """
-    columns, rows = read_rows(path, ("frame",), what="frame")
-    found = [name for name in names if f"{name}_x" in columns or f"{name}_y" in columns]
-    for name in found:
-        for column in (f"{name}_x", f"{name}_y"):
-            if column not in columns:
-                raise SpecError(f"{path}, line 1: there is no column {column}; a landmark has both _x and _y.")
+    header, rows = read_csv(path, ("frame",), expected="frame and, for each landmark, NAME_x and NAME_y")
+    found = [name for name in names if f"{name}_x" in header.columns or f"{name}_y" in header.columns]
+    header.require([f"{name}_{axis}" for name in found for axis in "xy"])
     if not found:
-        raise SpecError(
-            f"{path}, line 1: there is no landmark; name columns such as {names[0]}_x and {names[0]}_y "
-            f"(known are {', '.join(names)})."
-        )
+        right = f"name columns such as {names[0]}_x and {names[0]}_y (known are {', '.join(names)})"
+        raise header.fault("there is no landmark", right)
     first = _first(rows)
     points = [
         [[row.number(f"{name}_{axis}", -_MAX_PIXELS, _MAX_PIXELS) for axis in "xy"] for name in found] for row in rows
@@ -128,7 +123,6 @@ def _first(rows: Sequence[Row]) -> int:
     first = rows[0].whole("frame")
     for expected, row in enumerate(rows, start=first):
         if row.whole("frame") != expected:
-            raise row.fault(
-                f"the frame is {row.fields['frame']}", f"it must be {expected}, as frames are numbered without gaps"
-            )
+            right = f"it must be {expected}, as frames are numbered without gaps"
+            raise row.fault(f"the frame is {row.text('frame')}", right, column="frame")
     return first

@@ -138,21 +138,21 @@ def test_what_is_written_is_read_back(kind, tmp_path, request):
 @pytest.mark.parametrize(
     ("line", "column", "value", "message"),
     [
-        (3, "4.1.x", "wide", "line 3, column 4.1.x: 'wide' is no number; values are decimal numbers"),
-        (3, "4.1.x", "", "line 3, column 4.1.x: '' is no number"),
-        (3, "4.1.x", "nan", "line 3, column 4.1.x: 'nan' is no number"),
-        (3, "4.1.x", "1e400", "line 3, column 4.1.x: '1e400' is no number"),
-        (3, "4.1.x", "1e9", "line 3, column 4.1.x: 1e9 is out of range"),
-        (4, "sample", " ", "line 4, column sample: the cell is empty"),
+        (3, "4.1.x", "wide", "line 3, column 4.1.x: the value is 'wide'; it must be a number"),
+        (3, "4.1.x", "", "line 3, column 4.1.x: the value is ''"),
+        (3, "4.1.x", "nan", "line 3, column 4.1.x: the value is 'nan'"),
+        (3, "4.1.x", "1e400", "line 3, column 4.1.x: the value is '1e400'"),
+        (3, "4.1.x", "1e9", "line 3, column 4.1.x: the value is '1e9'; it must be a number from -1e+06 to 1e+06"),
+        (4, "sample", " ", "line 4, column sample: the field is empty"),
         (5, "state", "onset", "line 5, column state: the state is 'onset'; it must be neutral or apex"),
         (3, "state", "neutral", "line 3, column sample: s1 has a second neutral face"),
         (3, "subject", "p2", "line 3, column subject: p2 shows s1, too; line 2 says"),
         (5, "subject", "p9", "line 5, column state: s2 has no neutral face, nor has its subject p9; add"),
-        (1, "4.1.x", "forehead", "column forehead: there is no such column"),
-        (1, "4.1.x", "4.1.y", "column 4.1.y: the name comes twice"),
-        (1, "4.1.x", "", "column 5 has no name"),
-        (1, "4.1.x", "4.1.z", "the columns 4.1.x are missing"),
-        (1, "state", "4.1.z", "the columns state are missing"),
+        (1, "4.1.x", "forehead", "line 1: the column 'forehead' is unknown; the first line must name the columns"),
+        (1, "4.1.x", "4.1.y", "line 1: the column '4.1.y' comes twice"),
+        (1, "4.1.x", "", "line 1: column 5 has no name"),
+        (1, "4.1.x", "4.1.z", "line 1: there is no column 4.1.x; the first line must name"),
+        (1, "state", "4.1.z", "line 1: there is no column state; the first line must name"),
     ],
 )
 def test_faults_are_told_by_line_and_column(folder, line, column, value, message):
@@ -193,8 +193,8 @@ def test_mirrored_faces_are_refused(folder):
     [
         (b"", "line 1: the file is empty"),
         (b"\xff\xfe", "is not UTF-8"),
-        (b'sample,"subject\n', "line 1: is no CSV"),
-        (b"sample\nsubject,", "the columns subject, emotion, state are missing"),
+        (b'sample,"subject\n', "line 1: is not CSV"),
+        (b"sample\nsubject,", "there is no column subject, emotion, state"),
     ],
 )
 def test_files_that_are_no_tables(folder, content, message):
@@ -206,9 +206,12 @@ def test_files_that_are_no_tables(folder, content, message):
 def test_rows_of_another_length_and_no_rows(folder):
     text = (folder / "landmarks.csv").read_text()
     (folder / "landmarks.csv").write_text(text + "s9,p1\n")
-    with pytest.raises(SpecError, match="line 8: has 2 cells; it must have 40"):
+    with pytest.raises(SpecError, match="line 8: has 2 fields; there must be 40"):
         read_set(folder)
     (folder / "landmarks.csv").write_text(text.splitlines()[0] + "\n")
+    with pytest.raises(SpecError, match="line 1: nothing follows"):
+        read_set(folder)
+    (folder / "landmarks.csv").write_text("\n".join(text.splitlines()[:2]) + "\n")
     with pytest.raises(SpecError, match="no expressive face"):
         read_set(folder)
 
@@ -221,12 +224,12 @@ def test_a_missing_file_is_the_systems_error(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("sample,rater,P,A\n", "the columns D are missing"),
-        ("sample,rater,P,A,D,X\n", "column X: there is no such column"),
-        ("sample,rater,P,A,D\ns1,r,0,0,1.5\n", "line 2, column D: 1.5 is out of range; values go from -1 to 1"),
-        ("sample,rater,P,A,D\ns1,r,0,,0\n", "line 2, column A: '' is no number"),
+        ("sample,rater,P,A\n", "line 1: there is no column D; the first line must name the columns sample,rater,P,A,D"),
+        ("sample,rater,P,A,D,X\ns1,r,0,0,0,0\n", "line 1: the column 'X' is unknown"),
+        ("sample,rater,P,A,D\ns1,r,0,0,1.5\n", "line 2, column D: the value is '1.5'; it must be a number from -1"),
+        ("sample,rater,P,A,D\ns1,r,0,,0\n", "line 2, column A: the value is ''"),
         ("sample,rater,P,A,D\ns7,r,0,0,0\n", "line 2, column sample: there is no sample s7"),
-        ("sample,rater,P,A,D\ns1,,0,0,0\n", "line 2, column rater: the cell is empty"),
+        ("sample,rater,P,A,D\ns1,,0,0,0\n", "line 2, column rater: the field is empty"),
         ("sample,rater,P,A,D\ns1,r,0,0,0\ns1,r,0,0,0\n", "line 3, column rater: r rates s1 again, as in line 2"),
         ("sample,rater,P,A,D\ns1,r,0,0,0\ns2,r,0,0,0\n", "the sample s3 has no rating"),
     ],

@@ -150,7 +150,7 @@ def test_many_points_become_angles(run: object, folder: Path) -> None:
     ("arguments", "parts"),
     [
         (("move", "none.csv", "--out", "b.fap"), ("none.csv", "No such file")),
-        (("move", "broken.csv", "--out", "b.fap"), ("broken.csv, line 2: P is '7'",)),
+        (("move", "broken.csv", "--out", "b.fap"), ("broken.csv, line 2, column P: the value is '7'",)),
         (("move", "words.csv", "--out", "nowhere/b.fap"), ("does not exist", "--out")),
         (("move", "words.csv", "--out", "b.fap", "--angles", "nowhere/b.csv"), ("does not exist", "--angles")),
         (("statistics", "words.csv", "words.csv"), ("words.csv, line 1", "no column frame")),
