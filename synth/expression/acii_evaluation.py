@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.errors import SpecError
 from synth.expression.evaluation import mean_of
 from synth.expression.pad_pep import QuadraticModel
 from synth.expression.validation import correlations, intermediate, split_by_subject
@@ -80,8 +81,13 @@ def evaluate_polynomial(
     Raises
     ------
     SpecError
-        If the samples are not pairs of finite numbers, or a subject has too few.
+        If the samples are not pairs of finite numbers, names are missing, or a subject has too few samples.
     """
+    if not len(pad) == len(pep) == len(subjects) == len(expressions) or pep.ndim != 2 or len(codes) != pep.shape[1]:
+        raise SpecError(
+            f"Evaluation: {len(pad)} PAD, {len(pep)} PEP, {len(subjects)} subjects, {len(expressions)} expressions and "
+            f"{len(codes)} codes are given, but each sample needs one of each, and each PEP a code."
+        )
     split = split_by_subject(subjects, expressions, folds=folds, rng=np.random.default_rng([seed, len(pad)]))
     models = [QuadraticModel.fit(pad[rows], pep[rows]) for rows in map(split.rest, range(folds))]
     by_fold = np.stack(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from synth.errors import SpecError
 from synth.expression.pad_pep import PadPepModel, bounded
-from synth.expression.samples import check_pad, digest
+from synth.expression.samples import check_pad, check_pairs, digest
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,10 @@ class Calibration:
             values = getattr(self, name)
             shape = (3,) if name in {"pad_mean", "reliability"} else self.pep_mean.shape
             if values.shape != shape or values.ndim != 1 or not np.isfinite(values).all():
-                raise SpecError(f"Calibration: {name} must be finite numbers of shape {shape}, not {values.shape}.")
+                wanted = shape if len(shape) == 1 else "(K,)"
+                raise SpecError(
+                    f"Calibration: {name}, of shape {values.shape}, must be finite numbers of shape {wanted}."
+                )
         if not ((self.reliability > 0.0) & (self.reliability <= 1.0)).all() or (self.gain < 1.0).any():
             raise SpecError("Calibration: reliabilities must be more than 0 and at most 1, gains at least 1.")
 
@@ -66,11 +69,21 @@ class Calibration:
 
         ``reliability`` (3,) is that of the mean over raters; left out, the PAD are taken for exact. It counts as
         `LEAST_RELIABILITY` where it is less.
+
+        Raises
+        ------
+        SpecError
+            If the samples are not pairs of finite numbers, or the reliability is not three.
         """
+        check_pairs(check_pad(pad), pep)
         known = np.ones(3) if reliability is None else np.clip(reliability, LEAST_RELIABILITY, 1.0)
-        spread, wanted = model.predict(check_pad(pad)).std(axis=0), pep.std(axis=0)
+        mean = pad.mean(axis=0)
+        # PAD without the raters' error vary by the root of the reliability less; dividing by the reliability, as
+        # drawing does, leaves one over the root.
+        drawn = np.clip(mean + (pad - mean) / np.sqrt(known), -1.0, 1.0)
+        spread, wanted = model.predict(drawn).std(axis=0), pep.std(axis=0)
         gain = np.clip(wanted / np.maximum(spread, 1e-12), 1.0, LARGEST_GAIN)
-        return cls(pad_mean=pad.mean(axis=0), reliability=known, pep_mean=pep.mean(axis=0), gain=gain)
+        return cls(pad_mean=mean, reliability=known, pep_mean=pep.mean(axis=0), gain=gain)
 
 
 @dataclass(frozen=True, eq=False)

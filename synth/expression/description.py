@@ -7,9 +7,13 @@ from numpy.typing import NDArray
 
 from synth.errors import SpecError
 from synth.expression.model_set import ModelSet
+from synth.expression.pep import codes
 from synth.fap.table import check_sequence
 
 Floats = NDArray[np.float64]
+
+
+_EXPRESSIVE = [k for k, code in enumerate(codes()) if code not in {"3", "4", "5"}]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +27,8 @@ class Description:
     pad : (T, 3) float64
         Pleasure, arousal and dominance, each in [-1, 1].
     apex : int
-        The frame with the strongest expression: the largest sum of squared PEPs, the first of several.
+        The frame with the strongest expression, the first of several: the largest sum of squared PEPs but those of
+        eyelids and gaze, as a blink is no expression.
     rmse : (3,) float64
         Root mean square error of P, A and D in the model's cross-validation.
     """
@@ -56,6 +61,6 @@ def describe(values: NDArray[np.floating] | Floats, models: ModelSet) -> Descrip
     return Description(
         pep=pep,
         pad=models.pep_pad.predict(pep),
-        apex=int(np.argmax(np.einsum("tk,tk->t", pep, pep))),
+        apex=int(np.argmax(np.sum(pep[:, _EXPRESSIVE] ** 2, axis=1))),
         rmse=models.pep_pad.rmse,
     )

@@ -131,6 +131,7 @@ def choose_hidden(
     *,
     seed: int,
     sizes: Sequence[int] = HIDDEN,
+    spread: Floats | None = None,
     options: Options | None = None,
     on_progress: Progress | None = None,
 ) -> dict[int, float]:
@@ -145,7 +146,7 @@ def choose_hidden(
     for size in sizes:
         own = [(job, one) for job, one in zip(jobs, trained, strict=True) if job.hidden == size]
         models = _best_of([job for job, _ in own], [one for _, one in own], len(split.folds), pep.shape[1])
-        result[size] = float(np.nanmean(_scored(pad, pep, split, models).nmse))
+        result[size] = float(mean_of(_scored(pad, pep, split, models, spread).nmse.reshape(-1, 1))[0])
     return result
 
 

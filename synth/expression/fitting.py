@@ -27,6 +27,9 @@ FOLDS = 10
 TEST_SHARE = 0.2
 """Folds and test set of MTAP 2013, section 4.4."""
 
+FEW = 10
+"""Samples of a fold below which its own variance is not worth being compared with."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
@@ -65,6 +68,9 @@ class Samples:
         check_pairs(check_pad(self.pad), check_sequence(self.faps), names=("PAD", "FAP"))
         if len(self.emotions) != len(self.pad):
             raise SpecError(f"{self.name}: {len(self.emotions)} emotions are named for {len(self.pad)} expressions.")
+        known = self.reliability
+        if known is not None and (known.shape != (3,) or not np.isfinite(known).all()):
+            raise SpecError(f"{self.name}: the reliability, of shape {known.shape}, must be three finite numbers.")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,6 +96,9 @@ class SetEvaluation:
         where there are no emotions.
     permuted : dict of str to float
         Mean NMSE in cross-validation when PAD is shuffled among the expressions: near 1, or something leaks.
+    pooled : bool
+        Whether errors are relative to the variance of all training samples instead of each fold's own (Eq. 12), as
+        folds have fewer than `FEW` samples.
     """
 
     hidden: int
@@ -101,6 +110,7 @@ class SetEvaluation:
     pep_fap_nmse: Floats
     held_out: dict[str, float] = field(default_factory=dict)
     permuted: dict[str, float] = field(default_factory=dict)
+    pooled: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return all as plain JSON values; NaN becomes None."""
@@ -121,6 +131,7 @@ class SetEvaluation:
                 }
                 for kind, scores in self.scores.items()
             },
+            "pooled": self.pooled,
             "pep_fap": {"nmse": plain(self.pep_fap_nmse)},
         }
 
@@ -160,20 +171,31 @@ def fit_set(
     Raises
     ------
     SpecError
-        If there are too few samples, or they are not what they should be.
+        If there are too few samples, no expression moves, no number of hidden units is given, or the seed is negative.
     """
+    if not sizes or seed < 0:
+        raise SpecError(
+            f"Training: {len(sizes)} sizes and seed {seed} given; a size and a seed of at least 0 are needed."
+        )
     split = random_split(
         len(samples.pad), folds=folds, test_share=TEST_SHARE, rng=np.random.default_rng([seed, len(samples.pad)])
     )
     training = np.setdiff1d(np.arange(len(samples.pad)), split.test)
     pep_fap = PepFapModel.fit(samples.faps[training], fallback=template(MTAP))
     pep = np.clip(pep_fap.invert(samples.faps), -1.0, 1.0)
+    if not np.ptp(pep[training], axis=0).any():
+        raise SpecError(f"{samples.name}: the key FAPs are the same in all expressions, so there is nothing to learn.")
+    if np.ptp(samples.pad, axis=0).max() == 0.0:
+        raise SpecError(f"{samples.name}: all expressions have the same PAD, so there is nothing to learn from.")
+    # The variance of a handful of samples is a matter of chance, and would decide about errors relative to it.
+    few = min(map(len, split.folds)) < FEW
+    spread = pep[training].std(axis=0) if few else None
     by_size = {}
     hidden = sizes[0]
     if len(sizes) > 1:
-        by_size = choose_hidden(samples.pad, pep, split, seed=seed, sizes=sizes, on_progress=on_progress)
+        by_size = choose_hidden(samples.pad, pep, split, seed=seed, sizes=sizes, spread=spread, on_progress=on_progress)
         hidden = min(by_size, key=lambda size: by_size[size])
-    scores = cross_validate(samples.pad, pep, split, hidden=hidden, seed=seed, on_progress=on_progress)
+    scores = cross_validate(samples.pad, pep, split, hidden=hidden, seed=seed, spread=spread, on_progress=on_progress)
     chosen = {kind: intermediate(scores[kind].fold_nmse) for kind in KINDS}
     final = {kind: scores[kind].models[chosen[kind]] for kind in KINDS}
     predicted = {kind: model.predict(samples.pad[split.test]) for kind, model in final.items()}
@@ -182,11 +204,12 @@ def fit_set(
         hidden_nmse=by_size,
         scores=scores,
         chosen_fold=chosen,
-        test_nmse={kind: nmse(pep[split.test], values) for kind, values in predicted.items()},
+        test_nmse={kind: nmse(pep[split.test], values, spread=spread) for kind, values in predicted.items()},
         test_correlation={kind: correlations(pep[split.test], values) for kind, values in predicted.items()},
         pep_fap_nmse=translation_nmse(samples.faps[split.test], pep_fap),
         held_out=_held_out(samples, pep, hidden, seed),
-        permuted=_permuted(samples.pad, pep, split, hidden, seed),
+        permuted=_permuted(samples.pad, pep, split, hidden=hidden, seed=seed, spread=spread),
+        pooled=few,
     )
     models = ModelSet(
         ann=cast(NetworkModel, final["ann"]),
@@ -237,7 +260,9 @@ def _held_out(samples: Samples, pep: Floats, hidden: int, seed: int) -> dict[str
     return {kind: float(np.average(one.fold_nmse, weights=sizes)) for kind, one in scores.items()}
 
 
-def _permuted(pad: Floats, pep: Floats, split: Split, hidden: int, seed: int) -> dict[str, float]:
+def _permuted(
+    pad: Floats, pep: Floats, split: Split, *, hidden: int, seed: int, spread: Floats | None
+) -> dict[str, float]:
     order = np.random.default_rng([seed, 1]).permutation(len(pad))
-    scores = cross_validate(pad[order], pep, split, hidden=hidden, seed=seed, restarts=1)
-    return {kind: float(np.nanmean(one.mean_nmse)) for kind, one in scores.items()}
+    scores = cross_validate(pad[order], pep, split, hidden=hidden, seed=seed, restarts=1, spread=spread)
+    return {kind: float(mean_of(one.mean_nmse[:, None])[0]) for kind, one in scores.items()}

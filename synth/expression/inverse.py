@@ -50,8 +50,10 @@ class PepPadModel:
         Raises
         ------
         SpecError
-            If they are not pairs of finite numbers.
+            If they are not pairs of finite numbers, or the split has no folds.
         """
+        if not split.folds:
+            raise SpecError("PEP to PAD: the split has no folds, so the error cannot be told.")
         pep, pad = _check_pep(pep), check_pad(pad)
         check_pairs(pep, pad, names=("PEP", "PAD"))
         terms = _terms(pep)

@@ -103,9 +103,9 @@ class ModelSet:
             parts = json.loads(text)
             made_as = parts["format"]
             models = cls._of_parts(parts) if made_as == FORMAT else None
-        except SpecError:
-            raise
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+        except SpecError as error:
+            raise SpecError(f"{source}: {error}") from error
+        except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
             raise SpecError(f"{source} is not a set of trained models ({type(error).__name__}: {error}).") from error
         if models is None:
             raise SpecError(f"{source} has the format {made_as!r}, but this padlab reads {FORMAT}.")
@@ -128,10 +128,12 @@ class ModelSet:
                 kind: Calibration(**{name: np.array(parts["calibrations"][kind][name]) for name in _CALIBRATION})
                 for kind in KINDS
             },
-            origin=dict(parts["origin"]),
+            origin={**parts["origin"]},
         )
 
     def _check(self, source: str) -> None:
+        if self.pep_fap.scheme != MTAP:
+            raise SpecError(f"{source}: the PEPs must be those of {MTAP!r}, not of {self.pep_fap.scheme!r}.")
         count = len(peps(MTAP))
         shapes = {
             "linear T": (self.linear.T, (count, 3)),
@@ -139,11 +141,12 @@ class ModelSet:
             "quadratic coefficients": (self.quadratic.coefficients, (7, count)),
             "ann b2": (self.ann.b2, (count,)),
             "pep_pad coefficients": (self.pep_pad.coefficients, (2 * count + 1, 3)),
+            "pep_pad rmse": (self.pep_pad.rmse, (3,)),
             **{f"{kind} gain": (own.gain, (count,)) for kind, own in self.calibrations.items()},
         }
         for name, (values, shape) in shapes.items():
             if values.shape != shape or not np.isfinite(values).all():
-                raise SpecError(f"{source}: {name} must be finite numbers of shape {shape}, not {values.shape}.")
+                raise SpecError(f"{source}: {name}, of shape {values.shape}, must be finite numbers of shape {shape}.")
 
     @classmethod
     def read(cls, file: Path) -> Self:
@@ -175,4 +178,6 @@ def bundled_set() -> ModelSet:
 
 
 def _lists(model: object, *names: str) -> dict[str, Any]:
-    return {name: getattr(model, name).tolist() for name in names}
+    arrays = {name: getattr(model, name) for name in names}
+    # JSON has no NaN, which is the correlation with a P, A or D that does not vary; null is read as NaN.
+    return {name: np.asarray(np.where(np.isfinite(own), own, None)).tolist() for name, own in arrays.items()}

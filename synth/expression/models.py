@@ -88,17 +88,20 @@ def load_model(name: str, models_dir: Path | None = None) -> ExpressionModel:
         return _built_in(name)
     file = None if models_dir is None else models_dir / found["set"] / FILE_NAME
     if file is None or not file.is_file():
-        there = sorted(path.parent.name for path in models_dir.glob(f"*/{FILE_NAME}")) if models_dir else []
+        names = [path.parent.name for path in models_dir.glob(f"*/{FILE_NAME}")] if models_dir else []
+        there = sorted(name for name in names if _NAME.fullmatch(f"{name}/{KINDS[0]}"))
         raise SpecError(
             f"There is no trained set {found['set']!r}; "
             + (f"there are {', '.join(there)}." if there else "make one with `padlab train`.")
         )
-    # The file's time is a key of the cache, so that a set that was trained anew is noticed.
-    return _of_set(name, _read(file, file.stat().st_mtime_ns), found["kind"])
+    # What tells files apart is a key of the cache, so that a set that was trained anew is noticed. Its time alone does
+    # not: a copy may keep it, and file systems count it in steps.
+    now = file.stat()
+    return _of_set(name, _read(file, (now.st_mtime_ns, now.st_ino, now.st_size)), found["kind"])
 
 
 @lru_cache(maxsize=4)
-def _read(file: Path, _time: int) -> ModelSet:
+def _read(file: Path, _version: tuple[int, int, int]) -> ModelSet:
     return ModelSet.read(file)
 
 

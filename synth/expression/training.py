@@ -1,5 +1,6 @@
 """Training of many networks at once: all folds, targets and restarts of a size in batches, on all cores."""
 
+import math
 import os
 from collections import defaultdict
 from collections.abc import Callable, Sequence
@@ -20,8 +21,8 @@ Indices = NDArray[np.int64]
 
 MAX_HIDDEN = 100
 
-_BATCH_BYTES = 3_000_000
-"""Size of a batch's Jacobians: so large that calls do not count, so small that they stay in the processor's cache."""
+_BATCH_BYTES = 24_000_000
+"""Size of a batch's Jacobians: so large that threads seldom wait for each other between two steps of Python."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -124,8 +125,9 @@ def train_networks(
     tell(0, len(jobs))
     finished = 0
     # The matrices are small: BLAS's own threads would only wait for each other.
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        batches = _batches(jobs)
+    at_once = threads or os.cpu_count() or 1
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(at_once) as pool:
+        batches = _batches(jobs, at_once)
         for numbers, trained in zip(
             batches,
             pool.map(lambda numbers: _train([jobs[k] for k in numbers], pad, wanted, seed, options), batches),
@@ -150,16 +152,18 @@ def _check_job(job: Job, shape: tuple[int, ...]) -> None:
             raise SpecError(f"Training: a part has no rows, or rows beyond the {shape[0]} samples.")
 
 
-def _batches(jobs: Sequence[Job]) -> list[list[int]]:
-    """Group the numbers of jobs of one size, the largest networks first, so that no core waits for them at the end."""
+def _batches(jobs: Sequence[Job], threads: int) -> list[list[int]]:
+    """Group the numbers of jobs of one size evenly, the largest networks first, so that no thread waits at the end."""
     by_size: dict[tuple[int, bool], list[int]] = defaultdict(list)
     for number, job in enumerate(jobs):
         by_size[job.hidden, job.held is not None].append(number)
     batches = []
     for (hidden, _), numbers in sorted(by_size.items(), reverse=True):
         longest = max(len(jobs[number].rows) for number in numbers)
-        size = max(1, _BATCH_BYTES // (8 * longest * parameter_count(hidden)))
-        batches += [numbers[start : start + size] for start in range(0, len(numbers), size)]
+        each = max(1, _BATCH_BYTES // (8 * longest * parameter_count(hidden)))
+        rounds = math.ceil(len(numbers) / (each * threads))
+        count = min(rounds * threads, len(numbers))
+        batches += [part.tolist() for part in np.array_split(np.array(numbers), count)]
     return batches
 
 

@@ -1,5 +1,6 @@
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from flask import Flask
@@ -7,12 +8,18 @@ from flask.testing import FlaskClient
 from werkzeug.test import TestResponse
 
 from evaluation import instruments
+from evaluation.simulate import simulate_responses
+from evaluation.study import StudySpec
 from webapp import create_app
 from webapp.config import Settings
 from webapp.db import Database
-from webapp.services import experimenters
+from webapp.models import StudyState
+from webapp.services import corpora, enrolment, experimenters, modelling, studies, trials
+from webapp.services.corpora import Corpus
+from webapp.services.modelling import ModelReport
 
 PASSWORD = "a long password"
+MINI = Path(__file__).resolve().parent.parent / "data" / "mini.yaml"
 
 
 @pytest.fixture
@@ -68,3 +75,66 @@ def answers() -> dict[str, str]:
     """A complete form of a trial."""
     form = {f"pad12.{item.id}": "1" for item in instruments.get("pad12").items}
     return {**form, "mos5.mos": "4", "playback": '[["play", 10, 0], ["ended", 900, 0.6]]'}
+
+
+@pytest.fixture(scope="session")
+def pseudo_corpus(face_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Corpus:
+    """The pseudo databases, made and annotated once."""
+    home = tmp_path_factory.mktemp("pseudo")
+    settings = Settings.from_env({"PADLAB_HOME": str(home), "PADLAB_FACE_DIR": str(face_dir)})
+    return corpora.load("pseudo", settings, seed=0)
+
+
+@pytest.fixture(scope="session")
+def pseudo_report(pseudo_corpus: Corpus) -> ModelReport:
+    """All models trained and evaluated on them, once."""
+    return modelling.build(pseudo_corpus, seed=0)
+
+
+def many_faces(slug: str, *, model: str = "table", faces: int = 15, instruments: str = "pad12, mos5") -> str:
+    """Write a study of faces spread over PAD, each at two intensities, tiny clips."""
+    places = [(((7 * k) % faces) / faces, ((4 * k) % faces) / faces, k / faces) for k in range(faces)]
+    stimuli = [
+        f"  - {{id: face{k}, label: {{en: Face {k}, zh: 脸{k}}}, clip: {{model: {model}, "
+        f"pad: [{1.6 * p - 0.8:.3f}, {a - 0.5:.3f}, {d - 0.5:.3f}], neutral_s: 0.0, onset_s: 0.0, hold_s: 0.1}}}}"
+        for k, (p, a, d) in enumerate(places)
+    ]
+    source = re.sub(r"(?m)^  - \{id: .*\n", "", MINI.read_text(encoding="utf-8"))
+    source = source.replace("slug: mini", f"slug: {slug}").replace("pad12, mos5", instruments)
+    return source.replace("stimuli:\n", "stimuli:\n" + "\n".join(stimuli) + "\n")
+
+
+@pytest.fixture
+def apply_study(database: Database, settings: Settings) -> Callable[..., StudySpec]:
+    """Apply and open a study of many faces."""
+
+    def make(slug: str, **options: object) -> StudySpec:
+        source = many_faces(slug, **options)
+        spec = StudySpec.from_yaml(source)
+        with database.write() as session:
+            studies.apply(session, spec, source, settings)
+            studies.set_state(session, slug, StudyState.OPEN)
+        return spec
+
+    return make
+
+
+@pytest.fixture
+def collect(database: Database) -> Callable[..., None]:
+    """Let simulated raters answer a study (or the first trials of it), stored as real answers are."""
+
+    def rate(spec: StudySpec, raters: int, *, seed: int = 1, first: int | None = None) -> None:
+        frame = simulate_responses(spec, raters, seed=seed)
+        frame = frame if first is None else frame[frame["trial"] <= first]
+        for _, own in frame.groupby("participant"):
+            with database.write() as session:
+                participant = enrolment.enrol(session, spec.slug, language="en")
+                visit = enrolment.begin_visit(session, participant, user_agent="simulated").id
+                for position, rows in own.groupby("trial"):
+                    answers = {
+                        name: dict(zip(part["item"], map(int, part["raw"]), strict=True))
+                        for name, part in rows.groupby("instrument")
+                    }
+                    trials.record(session, participant, int(position), answers, visit_id=visit)
+
+    return rate

@@ -12,7 +12,24 @@ def test_defaults_are_inside_the_home(tmp_path: Path) -> None:
     assert settings.database_url == f"sqlite:///{tmp_path / 'new' / 'padlab.sqlite'}"
     assert settings.media_url == str(tmp_path / "new" / "media")
     assert settings.face_dir == tmp_path / "new" / "face"
+    assert settings.models_dir == tmp_path / "new" / "models"
     assert settings.scheduler is None
+
+
+def test_trained_models_may_be_kept_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "me"))
+    places = {
+        "": tmp_path / "models",
+        "shared": tmp_path / "shared",
+        "../shared": tmp_path.parent / "shared",
+        "~/sets": tmp_path / "me" / "sets",
+    }
+    for value, place in places.items():
+        settings = Settings.from_env({"PADLAB_HOME": str(tmp_path), "PADLAB_MODELS_DIR": value})
+        assert settings.models_dir == place
+        # Reading the settings makes no folder: only training does.
+        assert not place.exists()
 
 
 def test_the_secret_key_is_made_once_and_kept_private(tmp_path: Path) -> None:

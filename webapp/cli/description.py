@@ -7,6 +7,7 @@ import click
 from synth.errors import SynthError
 from synth.expression.description import describe
 from synth.expression.model_set import FILE_NAME, ModelSet, bundled_set
+from synth.expression.models import load_model
 from synth.expression.pep import peps
 from synth.fap.file import read_fap
 from synth.pad import DIMENSIONS, PAD
@@ -44,7 +45,9 @@ def describe_file(file: Path, model: str, *, as_json: bool) -> None:
         click.echo(f"{name}  {value:+.2f}  (RMSE {rmse:.2f})")
     click.echo("Nearest words: " + ", ".join(f"{word.word} ({distance:.2f})" for word, distance in words))
     for pep, value in zip(peps(), found.pep[found.apex], strict=True):
-        click.echo(f"PEP {pep.code}  {value:+.2f}  {pep.plus if value >= 0 else pep.minus if value else '-'}")
+        # What is written as 0.00 points nowhere; adding 0.0 keeps "-0.00" off the page.
+        shown = round(float(value), 2) + 0.0
+        click.echo(f"PEP {pep.code}  {shown:+.2f}  {(pep.plus if shown > 0 else pep.minus) if shown else '-'}")
     click.echo(f"By models trained on {models.origin.get('data')}. {models.origin.get('note')}")
 
 
@@ -52,4 +55,7 @@ def _set_of(model: str) -> ModelSet:
     """Return the set that a model belongs to; padlab's own for the built-in ones."""
     if "/" not in model:
         return bundled_set()
-    return ModelSet.read(Settings.from_env().models_dir / model.split("/", maxsplit=1)[0] / FILE_NAME)
+    models_dir = Settings.from_env().models_dir
+    # Tells which sets there are if there is none of this name.
+    load_model(model, models_dir)
+    return ModelSet.read(models_dir / model.split("/", maxsplit=1)[0] / FILE_NAME)

@@ -64,6 +64,8 @@ def face(
             raise click.UsageError("--describe takes a FAP file alone, without P A D and --out.")
         describe_file(describe, model, as_json=as_json)
         return
+    if as_json:
+        raise click.UsageError("--json belongs to --describe FILE.fap.")
     if p is None or a is None or d is None or out is None:
         raise click.UsageError("Give P A D and --out FILE.png, or --describe FILE.fap.")
     check_out(out, ".png")

@@ -16,17 +16,20 @@ from evaluation.responses import DIMENSIONS, check_responses, score_trials
 from evaluation.seeding import generator
 from evaluation.simulate import annotate_incrementally
 from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
-from synth.clip import ClipSpec
+from synth.clip import ClipSpec, clip_digest
 from synth.corpus.expressions import ExpressionSet
-from synth.corpus.landmarks import read_set
+from synth.corpus.landmarks import LANDMARKS_FILE, read_set
 from synth.corpus.pseudo import generate
 from synth.expression.fitting import Samples
 from synth.expression.models import load_model
 from synth.expression.pep import ACII, MTAP
+from synth.fap.table import FAP_COUNT
 from synth.stage import Stage
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
+from webapp.media import MediaStore
+from webapp.models import Clip
 from webapp.services import results, studies
 
 Floats = NDArray[np.float64]
@@ -75,9 +78,9 @@ def load(reference: str, settings: Settings, *, seed: int) -> Corpus:
     Raises
     ------
     NotFoundError
-        If there is no such folder or study.
+        If there is no such folder or study, or the folder holds no annotated expressions.
     ConflictError
-        If the study has too few rated faces.
+        If the study holds no ratings to learn from, or its clips' models have changed; see `of_study`.
     SynthError
         If the folder's files are not what they should be.
     """
@@ -93,6 +96,8 @@ def load(reference: str, settings: Settings, *, seed: int) -> Corpus:
         raise NotFoundError(
             f"There is no folder {reference}; --data takes a folder, '{PSEUDO}' or '{STUDY_PREFIX}SLUG'"
         )
+    if not (folder / LANDMARKS_FILE).is_file():
+        raise NotFoundError(f"The folder {folder} holds no {LANDMARKS_FILE}; docs/corpora.md says what belongs into it")
     found = read_set(folder)
     return Corpus(samples=samples_of(found), expressions=found, acii=found)
 
@@ -148,15 +153,16 @@ def samples_of(expressions: ExpressionSet, *, reliability: Floats | None = None)
 def of_study(session: Session, slug: str, settings: Settings) -> Samples:
     """Return the faces that a study shows, with the mean PAD that its participants gave each (MTAP 2013, Eq. 13).
 
-    The FAPs are those that the clips' models made, at the apex. Faces of equal PEPs (a word in two conditions, say)
-    stay apart, as they were rated apart.
+    The FAPs are those that were shown, at the apex. Faces of equal PEPs (a word in two conditions, say) stay apart, as
+    they were rated apart.
 
     Raises
     ------
     NotFoundError
         If there is no such study.
     ConflictError
-        If it does not ask the 12-item PAD questionnaire, or no face has been rated.
+        If it does not ask the 12-item PAD questionnaire, no face has been rated, or it is no longer known which FAPs
+        were shown.
     """
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
@@ -166,13 +172,12 @@ def of_study(session: Session, slug: str, settings: Settings) -> Samples:
     answered = scores.dropna(subset=list(DIMENSIONS))
     by_cell = answered.groupby(["stimulus", "condition"])[list(DIMENSIONS)].mean()
     means = dict(zip(by_cell.index, by_cell.to_numpy(dtype=np.float64), strict=True))
-    clips = {
-        (stimulus.name, stimulus.condition.name): ClipSpec.from_dict(stimulus.clip.spec) for stimulus in study.stimuli
-    }
+    clips = {(stimulus.name, stimulus.condition.name): stimulus.clip for stimulus in study.stimuli}
     rated = [cell for cell in clips if cell in means]
     if not rated:
         raise ConflictError(f"The study '{slug}' has no rated face yet; train when participants have answered")
-    faps = np.array([_apex(clips[cell], settings) for cell in rated])
+    store = MediaStore(settings.media_url)
+    faps = np.array([_apex(clips[cell], store, settings) for cell in rated])
     pad = np.array([means[cell] for cell in rated])
     return Samples(
         name=f"{STUDY_PREFIX}{slug}",
@@ -198,9 +203,23 @@ def _reliability(scores: pd.DataFrame) -> Floats | None:
         return None
 
 
-def _apex(spec: ClipSpec, settings: Settings) -> Floats:
-    _, faps = load_model(spec.model, settings.models_dir).apex(np.array([spec.pad]), intensity=spec.intensity)
-    apex: Floats = faps[0]
+def _apex(clip: Clip, store: MediaStore, settings: Settings) -> Floats:
+    """Return the FAPs (68,) of a clip's expression: as its lineage tells, or as its model makes them if it is the same.
+
+    A set may have been trained anew since the clip was made; what its models make now was never rated.
+    """
+    apex = np.zeros(FAP_COUNT)
+    if store.has(clip.digest):
+        for number, value in store.lineage(clip.digest)["fap"].items():
+            apex[int(number) - 1] = value
+        return apex
+    spec = ClipSpec.from_dict(clip.spec)
+    if clip_digest(spec, settings.face_dir, settings.models_dir) != clip.digest:
+        raise ConflictError(
+            f"The media store does not hold the clip {clip.digest}, and the model {spec.model} or the face has changed "
+            "since it was made; name the media store that the participants' clips are in (PADLAB_MEDIA_URL)"
+        )
+    apex += load_model(spec.model, settings.models_dir).apex(np.array([spec.pad]), intensity=spec.intensity)[1][0]
     return apex
 
 

@@ -1,6 +1,7 @@
 """Training and evaluation of models on a corpus: what `padlab train` and `padlab models evaluate` do."""
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ from evaluation.statistics.contingency import Contingency, contingency
 from synth.errors import SpecError
 from synth.expression.acii_evaluation import AciiEvaluation, evaluate_polynomial
 from synth.expression.clusters import k_means
-from synth.expression.fitting import SetEvaluation, fit_set, plain
+from synth.expression.fitting import FOLDS, TEST_SHARE, SetEvaluation, fit_set, plain
 from synth.expression.model_set import ModelSet
 from synth.expression.pep import codes
 from synth.files import write_whole
@@ -25,7 +26,12 @@ from webapp.services.corpora import Corpus
 CLUSTERS = 7
 """Clusters of PEPs in ACII 2007, section 4.2."""
 
+SMALLEST = math.ceil(2 * FOLDS / (1.0 - TEST_SHARE))
+"""Expressions at least: a test set, and ten folds of two each."""
+
 BASIC_EMOTIONS = frozenset({"happy", "sad", "surprise", "fear", "anger", "disgust"})
+
+FIGURES = ("pad_by_emotion.svg", "pad_by_emotion.png")
 
 _DIMENSIONS = ("P", "A", "D")
 _CONTRACT_NAMES = {"linear": "linear", "quadratic": "quadratic", "ann": "network"}
@@ -97,7 +103,10 @@ class ModelReport:
         }
 
     def write(self, folder: Path, text: str) -> list[Path]:
-        """Write the report into a folder, which is made: ``evaluation.json``, ``evaluation.txt`` and the PAD figure."""
+        """Write the report into a folder, which is made: ``evaluation.json``, ``evaluation.txt`` and the PAD figure.
+
+        Data without measured expressions have no such figure; an older one of other data is removed.
+        """
         folder.mkdir(parents=True, exist_ok=True)
         files: dict[str, bytes | str] = {
             "evaluation.json": json.dumps(self.to_dict(), ensure_ascii=False, indent=1) + "\n",
@@ -110,8 +119,11 @@ class ModelReport:
             shown = basic if len(basic) > 1 else set(expressions.emotions) - {""}
             named = np.array([emotion in shown for emotion in expressions.emotions])
             emotions = [emotion for emotion in expressions.emotions if emotion in shown]
-            files["pad_by_emotion.svg"] = pad_by_category_svg(expressions.pad[named], emotions)
-            files["pad_by_emotion.png"] = pad_by_category_png(expressions.pad[named], emotions)
+            files[FIGURES[0]] = pad_by_category_svg(expressions.pad[named], emotions)
+            files[FIGURES[1]] = pad_by_category_png(expressions.pad[named], emotions)
+        for name in FIGURES:
+            if name not in files:
+                (folder / name).unlink(missing_ok=True)
         for name, content in files.items():
             write_whole(folder / name, content)
         return [folder / name for name in files]
@@ -125,7 +137,13 @@ def build(corpus: Corpus, *, seed: int, on_progress: Callable[[int, int], None] 
     SpecError
         If there are too few expressions to part them into a test set and folds.
     """
-    models, evaluation = fit_set(corpus.samples, seed=seed, on_progress=on_progress)
+    samples = corpus.samples
+    if len(samples.pad) < SMALLEST:
+        raise SpecError(
+            f"{samples.name} has {len(samples.pad)} annotated expressions; at least {SMALLEST} are needed, for a test "
+            f"set and {FOLDS} folds of two each."
+        )
+    models, evaluation = fit_set(samples, seed=seed, on_progress=on_progress)
     return ModelReport(
         corpus=corpus,
         models=models,
