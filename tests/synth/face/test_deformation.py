@@ -4,8 +4,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from synth.errors import SpecError
-from synth.expression.word_table import word_table
 from synth.expression.pep_fap import pep_to_fap
+from synth.expression.word_table import word_table
 from synth.face.deformation import solve
 from synth.face.eyes import pupil_diameter
 from synth.face.identity import IDENTITIES
