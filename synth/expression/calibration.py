@@ -76,6 +76,8 @@ class Calibration:
             If the samples are not pairs of finite numbers, or the reliability is not three.
         """
         check_pairs(check_pad(pad), pep)
+        if reliability is not None and (np.shape(reliability) != (3,) or not np.isfinite(reliability).all()):
+            raise SpecError("Calibration: the reliability must be three finite numbers, of P, A and D.")
         known = np.ones(3) if reliability is None else np.clip(reliability, LEAST_RELIABILITY, 1.0)
         mean = pad.mean(axis=0)
         # PAD without the raters' error vary by the root of the reliability less; dividing by the reliability, as

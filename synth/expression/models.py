@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from synth.errors import SpecError
 from synth.expression.model_set import FILE_NAME, KINDS, ModelSet, bundled_set
 from synth.expression.pad_pep import PadPepModel
+from synth.expression.pep import PEP_COUNT
 from synth.expression.pep_fap import PepFapModel, template
+from synth.expression.samples import check_pad
 from synth.expression.word_table import TableModel, word_table
 
 Floats = NDArray[np.float64]
 
-TABLE = "table"
+TABLE, NEUTRAL = "table", "neutral"
 
-MODEL_NAMES = (TABLE, *KINDS)
+MODEL_NAMES = (TABLE, *KINDS, NEUTRAL)
 """The models that come with padlab."""
 
 DEFAULT_MODEL = TABLE
@@ -51,6 +53,17 @@ class ExpressionModel:
         return pep, self.pep_fap.translate(pep)
 
 
+@dataclass(frozen=True)
+class NeutralModel:
+    """The face that shows nothing, whatever the emotion: a baseline of experiments (MTAP 2013, Table 9)."""
+
+    digest: str = "neutral"
+
+    def predict(self, pad: NDArray[np.floating] | Floats) -> Floats:
+        """Return PEPs (N, 9) of 0 for PAD values (N, 3)."""
+        return np.zeros((len(check_pad(pad)), PEP_COUNT))
+
+
 def check_model_name(name: object) -> str:
     """Return a model's name if it is one: a built-in one, or ``SET/KIND`` for one of a trained set.
 
@@ -59,7 +72,8 @@ def check_model_name(name: object) -> str:
     SpecError
         If it is not.
     """
-    if not isinstance(name, str) or not (found := _NAME.fullmatch(name)) or (found["set"] and found["kind"] == TABLE):
+    found = _NAME.fullmatch(name) if isinstance(name, str) else None
+    if not isinstance(name, str) or found is None or (found["set"] and found["kind"] not in KINDS):
         raise SpecError(
             f"There is no model {name!r}; there are {', '.join(MODEL_NAMES)}, and SET/{', SET/'.join(KINDS)} of a set "
             "made by `padlab train`."
@@ -73,8 +87,8 @@ def load_model(name: str, models_dir: Path | None = None) -> ExpressionModel:
     Parameters
     ----------
     name : str
-        "table" (the fourteen words), "ann", "linear" or "quadratic" (trained on padlab's pseudo database), or for
-        instance "mine/ann", that of the trained set in the folder ``mine``.
+        "table" (the fourteen words), "ann", "linear" or "quadratic" (trained on padlab's pseudo database), "neutral"
+        (no expression), or for instance "mine/ann", that of the trained set in the folder ``mine``.
     models_dir : Path, optional
         The folder of trained sets.
 
@@ -109,6 +123,8 @@ def _read(file: Path, _version: tuple[int, int, int]) -> ModelSet:
 def _built_in(name: str) -> ExpressionModel:
     if name == TABLE:
         return ExpressionModel(name, TableModel.fit(*word_table()[1:]), template())
+    if name == NEUTRAL:
+        return ExpressionModel(name, NeutralModel(), template())
     return _of_set(name, bundled_set(), name)
 
 

@@ -181,13 +181,21 @@ def test_without_emotions_to_hold_out_none_are(emotions):
     assert evaluation.to_dict()["pad_pep"]["ann"]["held_out_nmse"] is None
 
 
-def test_annotation_that_says_nothing_predicts_the_mean_face():
+def test_annotation_that_says_nothing_is_refused():
     pad, pep = faces(42)
-    models, evaluation = fit_set(samples_of(np.zeros_like(pad), pep), seed=0, sizes=(1,))
-    linear = models.linear.predict(PROBES)
-    np.testing.assert_allclose(linear, np.broadcast_to(linear[0], linear.shape))
-    assert evaluation.held_out["linear"] >= 1.0
-    assert type(models).from_json(models.to_json(), source="again").to_json() == models.to_json()
+    with pytest.raises(SpecError, match="the same PAD"):
+        fit_set(samples_of(np.full_like(pad, 0.25), pep), seed=0, sizes=(1,))
+
+
+def test_small_folds_are_compared_with_all_training_samples():
+    pad, pep = faces(42)
+    _, evaluation = fit_set(samples_of(pad, pep), seed=0, sizes=(1, 2))
+    assert evaluation.pooled
+    # Relative to the variance of three or four samples, one fold would carry the mean far beyond 1.
+    assert evaluation.scores["linear"].fold_nmse.max() < 3.0
+    assert all(0.5 < error < 3.0 for error in evaluation.permuted.values())
+    _, many = fit_set(samples_of(*faces(150)), seed=0, sizes=(1,))
+    assert not many.pooled
 
 
 def test_progress_is_told():

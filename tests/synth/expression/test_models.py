@@ -29,13 +29,20 @@ def write(models, folder):
 
 
 def test_the_built_in_models_are_those_of_the_bundled_set():
-    assert MODEL_NAMES == ("table", "ann", "linear", "quadratic")
+    assert MODEL_NAMES == ("table", "ann", "linear", "quadratic", "neutral")
     for kind in KINDS:
         model = load_model(kind)
         assert model.name == kind
         np.testing.assert_array_equal(model.pad_pep.predict(POINTS), bundled_set().for_drawing(kind).predict(POINTS))
         assert model.pep_fap.digest == bundled_set().pep_fap.digest
-    assert len({load_model(name).pad_pep.digest for name in MODEL_NAMES}) == 4
+    assert len({load_model(name).pad_pep.digest for name in MODEL_NAMES}) == 5
+
+
+def test_the_neutral_model_shows_nothing():
+    pep, faps = load_model("neutral").apex(POINTS)
+    assert pep.shape == (len(POINTS), 9)
+    assert not pep.any()
+    assert not faps.any()
 
 
 def test_the_table_is_exact_at_the_words():
@@ -158,7 +165,9 @@ def test_what_is_no_name_is_refused(name, tmp_path):
     inside.mkdir()
     write(own_set(0.0), tmp_path / "x")
     for ask in (check_model_name, lambda value: load_model(value, inside)):
-        with pytest.raises(SpecError, match=r"There is no model .* table, ann, linear, quadratic, and SET/ann"):
+        with pytest.raises(
+            SpecError, match=r"There is no model .* table, ann, linear, quadratic, neutral, and SET/ann"
+        ):
             ask(name)
 
 

@@ -173,11 +173,9 @@ def test_the_text_tells_the_papers_figures_from_ours(pseudo_report: ModelReport)
 
 
 def test_the_text_warns_of_small_folds(pseudo_report: ModelReport) -> None:
-    samples = pseudo_report.corpus.samples
-    few = replace(samples, pad=samples.pad[:40], faps=samples.faps[:40], emotions=samples.emotions[:40])
-    text = model_tables.text_of(replace(pseudo_report, corpus=Corpus(samples=few)))
-    assert "only 3 expressions or so" in " ".join(text.split())
-    assert "expressions or so" not in model_tables.text_of(pseudo_report)
+    small = replace(pseudo_report, evaluation=replace(pseudo_report.evaluation, pooled=True))
+    assert "folds have fewer than 10 expressions" in " ".join(model_tables.text_of(small).split())
+    assert "folds have fewer" not in model_tables.text_of(pseudo_report)
 
 
 def test_damaged_sets_do_not_hide_others(run: Run, folder: Path, pseudo_report: ModelReport) -> None:
