@@ -1,133 +1,27 @@
-"""The clip: a short film of an expressive face, as a pure function of its specification."""
+"""The clip: a short film of an expressive, speaking face, as a pure function of its specification."""
 
 import hashlib
 import json
-import re
-import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from synth.errors import SpecError
-from synth.expression.course import Course, blink_track, expression_track
-from synth.expression.models import DEFAULT_MODEL, ExpressionModel, check_model_name, load_model
-from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
+from synth.clip_spec import INTENSITIES, ClipSpec, real
+from synth.expression.models import DEFAULT_MODEL, load_model
+from synth.face.identity import DEFAULT_IDENTITY
 from synth.fap.table import FAP_COUNT, check_sequence
-from synth.lineage import digests, expression, picture_digests, versions
-from synth.pad import PAD
+from synth.lineage import digests, expression, picture_digests, speech_digests, versions
+from synth.pad import DIMENSIONS, PAD
+from synth.plan import ClipPlan, plan_clip
+from synth.speech.sound import fitted, write_wav
 from synth.stage import Stage
 from synth.video import write_png
 
 Floats = NDArray[np.float64]
-
-LANGUAGES = ("en", "zh")
-MAX_TEXT = 1000
-
-_SECONDS_PER_WORD = 0.35
-_SECONDS_PER_CHARACTER = 0.25
-
-# Inclusive ranges of the numeric fields; a hold of 0.1 s leaves at least one frame at any frame rate.
-_REAL_RANGES = {"intensity": (0.0, 1.5), "neutral_s": (0.0, 10.0), "onset_s": (0.0, 10.0), "hold_s": (0.1, 120.0)}
-_WHOLE_RANGES = {"width": (16, 3840), "height": (16, 2160), "fps": (10, 120), "seed": (0, 2**32 - 1)}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ClipSpec:
-    """Everything a clip depends on besides the face data and the renderer.
-
-    Parameters
-    ----------
-    text : str
-        The sentence, up to 1000 characters; empty for an expression without speech.
-    lang : {"en", "zh"}
-        Language of the text.
-    pad : tuple of float
-        Pleasure, arousal, dominance, each in [-1, 1].
-    model : str
-        From PAD to the face, see `synth.expression.models.load_model`.
-    intensity : float
-        Factor of the partial expression parameters, 0 to 1.5.
-    identity : str
-        Name of the face.
-    width, height : int
-        Frame size in pixels, even numbers.
-    fps : int
-        Frames per second, 10 to 120.
-    neutral_s, onset_s, hold_s : float
-        Seconds of the neutral face, of the way to the expression, and (at least) of the expression held.
-    seed : int
-        Seed of the small life in the face (blinks), 0 to 2**32 - 1.
-
-    Raises
-    ------
-    SpecError
-        If a field is of the wrong type or out of range.
-    """
-
-    text: str = ""
-    lang: str = "en"
-    pad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    model: str = DEFAULT_MODEL
-    intensity: float = 1.0
-    identity: str = DEFAULT_IDENTITY
-    width: int = 720
-    height: int = 576
-    fps: int = 25
-    neutral_s: float = 0.4
-    onset_s: float = 0.5
-    hold_s: float = 1.6
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        _check_text(self.text)
-        _check_choice("lang", self.lang, LANGUAGES)
-        check_model_name(self.model)
-        _check_choice("identity", self.identity, tuple(IDENTITIES))
-        # Equal specifications must be written alike, so 1 becomes 1.0 and -0.0 becomes 0.0.
-        object.__setattr__(self, "pad", PAD.parse(self.pad).as_tuple())
-        for name, (low, high) in _REAL_RANGES.items():
-            object.__setattr__(self, name, _real(name, getattr(self, name), low, high))
-        for name, (low, high) in _WHOLE_RANGES.items():
-            _check_whole(name, getattr(self, name), low, high)
-        for name in ("width", "height"):
-            if getattr(self, name) % 2:
-                raise SpecError(f"Clip: {name} is {getattr(self, name)}, but must be even, as the video format asks.")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields as plain JSON values."""
-        return {**asdict(self), "pad": list(self.pad)}
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Self:
-        """Make a specification of plain JSON values; fields left out take their defaults.
-
-        Raises
-        ------
-        SpecError
-            If a name is unknown or a value is not valid.
-        """
-        known = [field.name for field in fields(cls)]
-        unknown = sorted(set(values) - set(known))
-        if unknown:
-            raise SpecError(f"Clip: there is no field {', '.join(unknown)}; the fields are {', '.join(known)}.")
-        return cls(**values)
-
-    @property
-    def course(self) -> Course:
-        """When the expression comes; the hold is as long as asked, or longer if the text needs it."""
-        characters = sum("\u3400" <= char <= "\u9fff" for char in self.text)
-        words = len(re.findall(r"[^\W\u3400-\u9fff]+(?:['’-][^\W\u3400-\u9fff]+)*", self.text))
-        spoken_s = _SECONDS_PER_WORD * words + _SECONDS_PER_CHARACTER * characters
-        hold_s = max(self.hold_s, spoken_s)
-        return Course(fps=self.fps, neutral_s=self.neutral_s, onset_s=self.onset_s, hold_s=hold_s)
-
-    def canonical(self) -> str:
-        """Return the one JSON text of this specification: sorted keys, no spaces, ASCII only."""
-        return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
 
 
 def clip_digest(spec: ClipSpec, face_dir: Path, models_dir: Path | None = None) -> str:
@@ -149,21 +43,25 @@ def clip_digest(spec: ClipSpec, face_dir: Path, models_dir: Path | None = None) 
     SpecError
         If there is no such model.
     """
-    model = load_model(spec.model, models_dir)
-    return hashlib.sha256(json.dumps(digests(model, face_dir) | {"spec": spec.canonical()}).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(_digests(spec, face_dir, models_dir)).encode()).hexdigest()
 
 
-def clip_faps(spec: ClipSpec, models_dir: Path | None = None) -> Floats:
-    """Return the FAP values of a clip: (T, 68) float64, in FAPU; ``models_dir`` as in `clip_digest`."""
-    _, apex = _apex(spec.pad, load_model(spec.model, models_dir), spec.intensity)
-    expression = expression_track(apex, spec.course)
-    tracks = [expression, blink_track(expression, spec.course, np.random.default_rng(spec.seed))]
-    faps: Floats = np.sum(tracks, axis=0)
-    return faps
+def _digests(spec: ClipSpec, face_dir: Path, models_dir: Path | None) -> dict[str, Any]:
+    own = digests(load_model(spec.model, models_dir), face_dir)
+    spoken = speech_digests(spec.lang) if spec.text.strip() else {}
+    return own | spoken | {"spec": spec.canonical()}
 
 
-def render_clip(spec: ClipSpec, out: Path, face_dir: Path, models_dir: Path | None = None) -> dict[str, Any]:
-    """Render a clip to an MP4 file; equal specifications give equal bytes.
+def render_clip(
+    spec: ClipSpec,
+    out: Path,
+    face_dir: Path,
+    models_dir: Path | None = None,
+    *,
+    plan: ClipPlan | None = None,
+    on_progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Any]:
+    """Render a clip to an MP4 file, with its sound; equal specifications give equal bytes.
 
     Parameters
     ----------
@@ -173,34 +71,54 @@ def render_clip(spec: ClipSpec, out: Path, face_dir: Path, models_dir: Path | No
         The file; it appears complete or not at all. Its folder must exist.
     face_dir, models_dir
         As in `clip_digest`.
+    plan : ClipPlan, optional
+        The plan of the specification, if it is there already, or one with a recording.
+    on_progress : callable, optional
+        Called with the number of finished frames and of all.
 
     Returns
     -------
     dict
-        The lineage as plain JSON values: specification, text, PAD, PEP, FAP targets, seed, digests, versions, frames
-        and duration.
+        The lineage as plain JSON values: specification, text with prosodic words, PAD, PEP, FAP targets, phones, head
+        motion, seed, digests, versions, frames and duration.
 
     Raises
     ------
+    SpecError, SpeechError
+        If the text cannot be spoken.
     AssetError, RenderError, VideoError
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
-    model = load_model(spec.model, models_dir)
-    stage = Stage(face_dir, spec.identity)
-    faps = clip_faps(spec, models_dir)
-    stage.film(faps, out, fps=spec.fps, width=spec.width, height=spec.height)
-    pep, apex = _apex(spec.pad, model, spec.intensity)
+    planned = plan or plan_clip(spec, models_dir)
+    film_plan(planned, out, face_dir, on_progress=on_progress)
     return {
         "digest": clip_digest(spec, face_dir, models_dir),
-        "spec": spec.to_dict(),
-        "text": spec.text,
-        "seed": spec.seed,
-        "frames": len(faps),
-        "duration_s": len(faps) / spec.fps,
-        **expression(spec.pad, pep, apex),
-        "digests": digests(model, face_dir),
+        **planned.lineage(),
+        "digests": {name: value for name, value in _digests(spec, face_dir, models_dir).items() if name != "spec"},
         "versions": versions(),
     }
+
+
+def film_plan(
+    plan: ClipPlan, out: Path, face_dir: Path, *, on_progress: Callable[[int, int], None] | None = None
+) -> None:
+    """Film a plan to an MP4 file; the parameters are those of `render_clip`."""
+    spec, speech = plan.spec, plan.speech
+    stage = Stage(face_dir, spec.identity)
+    with tempfile.TemporaryDirectory() as place:
+        audio = None
+        if speech is not None and len(speech.samples) and not spec.mute:
+            audio = Path(place) / "speech.wav"
+            write_wav(audio, fitted(speech.samples, speech.rate, len(plan.faps), spec.fps), speech.rate)
+        stage.film(
+            plan.faps,
+            out,
+            fps=spec.fps,
+            width=spec.width,
+            height=spec.height,
+            audio=audio,
+            on_progress=on_progress,
+        )
 
 
 def render_faps(
@@ -319,14 +237,14 @@ def render_still(
     ):
         write_png(out, picture)
     chosen = load_model(model, models_dir)
-    pep, apex = _apex(point, chosen, float(intensity))
+    pep, apex = chosen.apex(np.array([point]), intensity=float(intensity))
     return {
         "model": model,
         "identity": identity,
         "width": width,
         "height": height,
         "intensity": float(intensity),
-        **expression(point, pep, apex),
+        **expression(point, pep[0], apex[0]),
         "digests": digests(chosen, face_dir),
         "versions": versions(),
     }
@@ -368,38 +286,7 @@ def draw_expressions(
     """
     points = [PAD.parse(pad).as_tuple() for pad in pads]
     chosen = load_model(model, models_dir)
-    strength = _real("intensity", intensity, *_REAL_RANGES["intensity"])
-    apices = np.array([_apex(point, chosen, strength)[1] for point in points]).reshape(-1, FAP_COUNT)
+    strength = real("intensity", intensity, *INTENSITIES)
+    pads_given = np.array(points).reshape(-1, len(DIMENSIONS))
+    apices = chosen.apex(pads_given, intensity=strength)[1].reshape(-1, FAP_COUNT)
     yield from Stage(face_dir, identity).pictures(apices, width=width, height=height)
-
-
-def _apex(pad: tuple[float, float, float], model: ExpressionModel, intensity: float) -> tuple[Floats, Floats]:
-    """Return the PEPs (9,) at full expression and their FAPs (68,)."""
-    pep, faps = model.apex(np.array([pad]), intensity=intensity)
-    return pep[0], faps[0]
-
-
-def _check_text(text: object) -> None:
-    if not isinstance(text, str):
-        raise SpecError(f"Clip: text is {text!r}, but must be a string.")
-    if len(text) > MAX_TEXT:
-        raise SpecError(f"Clip: text has {len(text)} characters, but at most {MAX_TEXT} are spoken in one clip.")
-    for char in text:
-        if unicodedata.category(char) in {"Cc", "Cs"} and char not in "\t\n\r":
-            raise SpecError(f"Clip: text contains the character U+{ord(char):04X}, but must be printable text.")
-
-
-def _check_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise SpecError(f"Clip: {name} is {value!r}, but must be one of {', '.join(choices)}.")
-
-
-def _real(name: str, value: object, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise SpecError(f"Clip: {name} is {value!r}, but must be a number from {low:g} to {high:g}.")
-    return float(value) + 0.0
-
-
-def _check_whole(name: str, value: object, low: int, high: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise SpecError(f"Clip: {name} is {value!r}, but must be a whole number from {low} to {high}.")

@@ -13,6 +13,10 @@ class RenderError(SynthError):
     """The renderer could not start or draw."""
 
 
+class SpeechError(SynthError):
+    """A sentence could not be spoken, or its sound could not be used."""
+
+
 class VideoError(SynthError):
     """A clip, a picture or another file could not be encoded or written."""
 

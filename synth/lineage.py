@@ -1,5 +1,8 @@
 """Lineage: what made a picture, as plain JSON values, so that it can be told later and made again."""
 
+import hashlib
+from functools import cache
+from importlib import resources
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -11,10 +14,14 @@ from numpy.typing import NDArray
 from synth.expression.models import ExpressionModel
 from synth.face.assets import asset_digest
 from synth.render import RENDERER_VERSION
+from synth.speech.espeak import EspeakVoice
 
 Floats = NDArray[np.float64]
 
-FORMAT = 2
+_TEXT_DATA = ("function_words.json", "goals.json", "lexicon_en.json", "lexicon_zh.json", "visemes.json")
+_TEXT_PACKAGES = ("jieba", "opencc-python-reimplemented", "pypinyin", "vadersentiment")
+
+FORMAT = 3
 """Part of a clip's identity; raise it when clips change though specification, models, face and renderer stay."""
 
 
@@ -46,6 +53,23 @@ def expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> di
     """Return PAD, PEPs (9,) and the FAPs (68,), in FAPU, of an expression; FAPs of 0 are left out."""
     faps = {str(k + 1): value for k, value in enumerate(apex.tolist()) if value}
     return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
+
+
+def speech_digests(lang: str) -> dict[str, Any]:
+    """Return what a spoken clip depends on besides: the voice, and the data and programs that analyse its text."""
+    voice = EspeakVoice(lang)
+    return {"voice": f"{voice.name} {voice.version}", "text": _text_digest()}
+
+
+@cache
+def _text_digest() -> str:
+    found = hashlib.sha256()
+    folder = resources.files("synth.data")
+    for name in sorted(_TEXT_DATA):
+        found.update(folder.joinpath(name).read_bytes())
+    for package in _TEXT_PACKAGES:
+        found.update(f"{package} {version(package)}".encode())
+    return found.hexdigest()
 
 
 def versions() -> dict[str, str]:

@@ -17,7 +17,8 @@ from typing import Any
 
 from distributed import Client, KilledWorker, LocalCluster, wait
 
-from synth.clip import ClipSpec, clip_digest, render_clip
+from synth.clip import clip_digest, render_clip
+from synth.clip_spec import ClipSpec
 from synth.errors import SynthError
 from synth.face import assets
 from webapp.config import Settings

@@ -1,13 +1,15 @@
-"""The course of an expression: from neutral to its apex, held there with a little life, as tracks of FAPs.
+"""The course of an expression: from neutral to its apex, held there, and away again, as tracks of FAPs.
 
 A track is an array (T, 68) of FAP values; the tracks of a clip are added together.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synth.errors import SpecError
 from synth.fap.table import FAP_COUNT, column
 
 Floats = NDArray[np.float64]
@@ -33,16 +35,19 @@ class Course:
         Frames per second.
     neutral_s, onset_s, hold_s : float
         Seconds of the neutral face, of the onset, and of the hold.
+    offset_s : float
+        Seconds from the end of the hold until the expression has gone; 0 if it stays.
     """
 
     fps: int
     neutral_s: float
     onset_s: float
     hold_s: float
+    offset_s: float = 0.0
 
     def times(self) -> Floats:
         """Return the time of each frame in seconds, the first at 0: (T,), T at least 1."""
-        total = self.neutral_s + self.onset_s + self.hold_s
+        total = self.hold_start + self.hold_s + self.offset_s
         return np.arange(max(1, round(total * self.fps))) / self.fps
 
     @property
@@ -57,22 +62,59 @@ def minimum_jerk(progress: NDArray[np.floating] | Floats) -> Floats:
     Source: Flash and Hogan 1985, The coordination of arm movements, for a movement from rest to rest.
     """
     p = np.clip(np.asarray(progress, dtype=np.float64), 0.0, 1.0)
-    return p**3 * (10.0 - 15.0 * p + 6.0 * p**2)
+    # Rounding may take the polynomial past 1 by a hair.
+    return np.minimum(p**3 * (10.0 - 15.0 * p + 6.0 * p**2), 1.0)
 
 
-def expression_track(apex: Floats, course: Course) -> Floats:
-    """Return the FAPs (T, 68) that go from neutral to the apex (68,) by minimum jerk and stay."""
+def expression_track(apex: Floats, course: Course, *, rest: float = 0.0) -> Floats:
+    """Return the FAPs (T, 68) that go from neutral to the apex (68,) by minimum jerk, stay, and go.
+
+    Parameters
+    ----------
+    apex : (68,)
+        FAP values at full expression.
+    course : Course
+        When it comes, and, if it has an offset, when it goes.
+    rest : float
+        Share of the expression, from 0 (neutral) to 1, that remains after the offset.
+
+    Raises
+    ------
+    SpecError
+        If ``rest`` is not in [0, 1].
+    """
+    if not 0.0 <= rest <= 1.0:
+        raise SpecError(f"Expression: rest is {rest!r}, but must be a number from 0 to 1.")
     since = course.times() - course.neutral_s
     # Without an onset the expression is there at once.
     progress = since / course.onset_s if course.onset_s > 0.0 else (since >= 0.0).astype(np.float64)
-    return minimum_jerk(progress)[:, None] * apex
+    intensity = minimum_jerk(progress)
+    if course.offset_s > 0.0:
+        gone = (course.times() - course.hold_start - course.hold_s) / course.offset_s
+        intensity = intensity - (1.0 - rest) * minimum_jerk(gone) * intensity
+    return intensity[:, None] * apex
 
 
 def blink_track(expression: Floats, course: Course, rng: np.random.Generator) -> Floats:
     """Return the FAPs (T, 68) that, added to the expression's, close both eyes at plausible times in the hold."""
+    return closed_eyes(expression, course.times(), _blink_times(course, rng))
+
+
+def closed_eyes(expression: Floats, times: Floats, starts: Sequence[float]) -> Floats:
+    """Return the FAPs (T, 68) that, added to the expression's, close both eyes in blinks.
+
+    Parameters
+    ----------
+    expression : (T, 68)
+        FAP values, which say how far the lids must go.
+    times : (T,)
+        Time of each frame in seconds.
+    starts : sequence of float
+        When each blink begins; they do not overlap (`BLINK_S`).
+    """
     track = np.zeros((len(expression), FAP_COUNT))
-    for start in _blink_times(course, rng):
-        closed = _lid_closure((course.times() - start) / BLINK_S)
+    for start in starts:
+        closed = _lid_closure((times - start) / BLINK_S)
         for upper, lower in zip(_UPPER_LIDS, _LOWER_LIDS, strict=True):
             left_open = np.maximum(_CLOSED_GAP - expression[:, upper] - expression[:, lower], 0.0)
             track[:, upper] += closed * left_open

@@ -4,6 +4,7 @@ import multiprocessing
 import resource
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
@@ -13,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.baseline import NaiveRenderer
+from synth.clip import film_plan
+from synth.clip_spec import ClipSpec
 from synth.expression.models import load_model
 from synth.face import assets
 from synth.face.deformation import solve
@@ -20,7 +23,10 @@ from synth.face.mesh import load_face
 from synth.face.motion import Motion
 from synth.face.rig import Rig
 from synth.fap.table import column
+from synth.plan import plan_clip
 from synth.render import Renderer
+from synth.speech.espeak import forget_speech
+from synth.text.analysis import guess_language
 from synth.video import VideoWriter
 from webapp.cli.bench_training import train
 from webapp.cli.context import echo_json
@@ -32,6 +38,15 @@ WIDTH, HEIGHT = 720, 576
 MEMORY_SECONDS = (10, 60)
 
 Floats = NDArray[np.float64]
+
+SENTENCES = (
+    "Victoria Peak is the most popular place in Hong Kong, and from the top you can look down on tall towers, the "
+    "world-famous harbour and the quiet green islands beyond it.",
+    "Thank you very much for your help, it was wonderful.",
+    "太平山頂是香港最受歡迎的名勝景點，登臨其間，可俯瞰山下鱗次櫛比的摩天高樓。",
+    "對不起，您能再說一遍嗎？",
+)
+"""What is said; the first takes about ten seconds."""
 
 _MOUTHS_PER_SECOND = 3.7
 _NODS = {48: (12_000, 0.31), 49: (16_000, 0.23), 50: (7_000, 0.17)}
@@ -59,11 +74,40 @@ def render(as_json: bool) -> None:
     figures = _speed(folder)
     for seconds in MEMORY_SECONDS:
         figures[f"render.peak_memory_mb_{seconds}s"] = round(_in_fresh_process(_peak_memory, folder, seconds), 1)
+    figures |= _saying(folder)
     if as_json:
         echo_json(figures)
         return
     for name, value in figures.items():
         click.echo(f"{name}\t{value}")
+
+
+def _saying(folder: Path) -> dict[str, float]:
+    """Measure the way from text to film, all on, and that from text to FAPs, without drawing; both when warm."""
+    films, plans = [], []
+    spec = ClipSpec(text=SENTENCES[0])
+    with TemporaryDirectory() as place:
+        for seed in range(REPEATS + 1):
+            # Another seed is another clip; the text is analysed and spoken anew by clearing what is kept.
+            forget_speech()
+            start = time.perf_counter()
+            plan = plan_clip(replace(spec, seed=seed))
+            film_plan(plan, Path(place) / "clip.mp4", folder)
+            films.append(plan.duration_s / (time.perf_counter() - start))
+    for text in SENTENCES:
+        plan_clip(ClipSpec(text=text, lang=guess_language(text)))
+    for _ in range(REPEATS):
+        for text in SENTENCES:
+            forget_speech()
+            start = time.perf_counter()
+            plan_clip(ClipSpec(text=text, lang=guess_language(text)))
+            plans.append(1000.0 * (time.perf_counter() - start))
+    # The first film warms up and does not count.
+    return {
+        "say.realtime_factor": round(median(films[1:]), 3),
+        "say.clip_seconds": round(plan_clip(spec).duration_s, 2),
+        "text.ms_per_sentence": round(median(plans), 1),
+    }
 
 
 def talking(seconds: float) -> Floats:

@@ -16,7 +16,8 @@ from evaluation.responses import DIMENSIONS, check_responses, score_trials
 from evaluation.seeding import generator
 from evaluation.simulate import annotate_incrementally
 from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
-from synth.clip import ClipSpec, clip_digest
+from synth.clip import clip_digest
+from synth.clip_spec import ClipSpec
 from synth.corpus.expressions import ExpressionSet
 from synth.corpus.landmarks import LANDMARKS_FILE, read_set
 from synth.corpus.pseudo import generate
@@ -24,6 +25,7 @@ from synth.expression.fitting import Samples
 from synth.expression.models import load_model
 from synth.expression.pep import ACII, MTAP
 from synth.fap.table import FAP_COUNT
+from synth.plan import expressed_pad
 from synth.stage import Stage
 from webapp.config import Settings
 from webapp.db import Database
@@ -219,7 +221,9 @@ def _apex(clip: Clip, store: MediaStore, settings: Settings) -> Floats:
             f"The media store does not hold the clip {clip.digest}, and the model {spec.model} or the face has changed "
             "since it was made; name the media store that the participants' clips are in (PADLAB_MEDIA_URL)"
         )
-    apex += load_model(spec.model, settings.models_dir).apex(np.array([spec.pad]), intensity=spec.intensity)[1][0]
+    apex += load_model(spec.model, settings.models_dir).apex(
+        np.array([expressed_pad(spec).as_tuple()]), intensity=spec.intensity
+    )[1][0]
     return apex
 
 

@@ -9,7 +9,8 @@ from sqlalchemy.orm import Session
 from evaluation import located_yaml
 from evaluation.errors import Problem, StudyFileError
 from evaluation.study import Cell, StudySpec
-from synth.clip import ClipSpec, clip_digest
+from synth.clip import clip_digest
+from synth.clip_spec import ClipSpec
 from synth.errors import SpecError
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError

@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from synth.errors import SpecError
 from synth.expression.course import Course, blink_track, expression_track, minimum_jerk
 from synth.fap.table import FAP_COUNT, column
 
@@ -79,3 +80,20 @@ def test_a_short_hold_has_no_blink_and_a_long_one_has_several():
 def test_the_seed_decides_when():
     assert np.array_equal(_blinks(COURSE, 5)[1], _blinks(COURSE, 5)[1])
     assert not np.array_equal(_blinks(COURSE, 5)[1], _blinks(COURSE, 6)[1])
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.3])
+def test_with_an_offset_the_expression_goes_to_its_rest(rest):
+    course = Course(fps=50, neutral_s=0.2, onset_s=0.4, hold_s=1.0, offset_s=0.6)
+    share = expression_track(APEX, course, rest=rest)[:, 10] / APEX[10]
+    assert len(share) == 110
+    np.testing.assert_allclose(share[30:81], 1.0)
+    assert (np.diff(share[80:]) < 0).all()
+    assert share[-1] == pytest.approx(rest, abs=0.01)
+    assert np.abs(np.diff(share)).max() < 0.1
+
+
+@pytest.mark.parametrize("rest", [-0.1, 1.1, float("nan")])
+def test_an_impossible_rest_is_refused(rest):
+    with pytest.raises(SpecError, match="rest"):
+        expression_track(APEX, COURSE, rest=rest)

@@ -1,0 +1,1 @@
+"""Speech: sound with the times of its phones and words, by a voice or from a recording."""

@@ -1,0 +1,1 @@
+"""From a sentence to prosodic words, how they are meant, and what the sentence is for."""
