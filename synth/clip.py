@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.clip_spec import INTENSITIES, ClipSpec, real
+from synth.errors import SpecError
 from synth.expression.models import DEFAULT_MODEL, load_model
 from synth.face.identity import DEFAULT_IDENTITY
 from synth.fap.table import FAP_COUNT, check_sequence
@@ -18,6 +19,7 @@ from synth.lineage import digests, expression, picture_digests, speech_digests, 
 from synth.pad import DIMENSIONS, PAD
 from synth.plan import ClipPlan, plan_clip
 from synth.speech.sound import fitted, write_wav
+from synth.speech.spoken import Speech
 from synth.stage import Stage
 from synth.video import write_png
 
@@ -43,13 +45,18 @@ def clip_digest(spec: ClipSpec, face_dir: Path, models_dir: Path | None = None) 
     SpecError
         If there is no such model.
     """
-    return hashlib.sha256(json.dumps(_digests(spec, face_dir, models_dir)).encode()).hexdigest()
+    return _combined(spec, _digests(spec, face_dir, models_dir))
 
 
-def _digests(spec: ClipSpec, face_dir: Path, models_dir: Path | None) -> dict[str, Any]:
+def _combined(spec: ClipSpec, parts: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(parts | {"spec": spec.canonical()}).encode()).hexdigest()
+
+
+def _digests(
+    spec: ClipSpec, face_dir: Path, models_dir: Path | None, *, recording: Speech | None = None
+) -> dict[str, Any]:
     own = digests(load_model(spec.model, models_dir), face_dir)
-    spoken = speech_digests(spec.lang) if spec.text.strip() else {}
-    return own | spoken | {"spec": spec.canonical()}
+    return own | (speech_digests(spec.lang, recording=recording) if spec.text.strip() else {})
 
 
 def render_clip(
@@ -80,21 +87,25 @@ def render_clip(
     -------
     dict
         The lineage as plain JSON values: specification, text with prosodic words, PAD, PEP, FAP targets, phones, head
-        motion, seed, digests, versions, frames and duration.
+        motion, seed, digests, versions, frames and duration. The digest is `clip_digest`, but for a recording, whose
+        digest stands instead of the voice.
 
     Raises
     ------
     SpecError, SpeechError
-        If the text cannot be spoken.
+        If the text cannot be spoken, or the plan is of another specification.
     AssetError, RenderError, VideoError
         If the face data are missing, OpenGL does not start, or the file cannot be written.
     """
     planned = plan or plan_clip(spec, models_dir)
+    if planned.spec != spec:
+        raise SpecError("Clip: the plan is that of another specification; plan this one, or leave the plan out.")
     film_plan(planned, out, face_dir, on_progress=on_progress)
+    parts = _digests(spec, face_dir, models_dir, recording=planned.speech if planned.recorded else None)
     return {
-        "digest": clip_digest(spec, face_dir, models_dir),
+        "digest": _combined(spec, parts),
         **planned.lineage(),
-        "digests": {name: value for name, value in _digests(spec, face_dir, models_dir).items() if name != "spec"},
+        "digests": parts,
         "versions": versions(),
     }
 

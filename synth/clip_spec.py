@@ -119,7 +119,7 @@ class ClipSpec:
             object.__setattr__(self, "pad", PAD.parse(self.pad).as_tuple())
         if self.dominance is not None:
             object.__setattr__(self, "dominance", PAD(0.0, 0.0, self.dominance).D)
-        object.__setattr__(self, "words", tuple(_annotated(row) for row in self.words))
+        object.__setattr__(self, "words", _annotation(self.words))
         for name, (low, high) in _REAL_RANGES.items():
             object.__setattr__(self, name, real(name, getattr(self, name), low, high))
         for name, (low, high) in _WHOLE_RANGES.items():
@@ -177,6 +177,12 @@ def _check_text(text: object) -> None:
     for char in text:
         if unicodedata.category(char) in {"Cc", "Cs"} and char not in "\t\n\r":
             raise SpecError(f"Clip: text contains the character U+{ord(char):04X}, but must be printable text.")
+
+
+def _annotation(words: object) -> tuple[tuple[str, float | None, float | None], ...]:
+    if not isinstance(words, (tuple, list)):
+        raise SpecError(f"Clip: words is {words!r}, but must be a list of words, each with its P and A.")
+    return tuple(map(_annotated, words))
 
 
 def _annotated(row: object) -> tuple[str, float | None, float | None]:

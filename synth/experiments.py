@@ -52,7 +52,8 @@ def experiment_clips(experiment: str, lang: str, **fields: Any) -> dict[str, Cli
     lang : {"en", "zh"}
         Language of the sentences about scenic spots, see `synth.text.corpus`.
     **fields
-        Further fields of `ClipSpec`, for instance ``identity``.
+        Further fields of `ClipSpec`, for instance ``identity``; not those that tell the clips apart. Each sentence has
+        its own seed, the same in all conditions, unless ``seed`` is given.
 
     Returns
     -------
@@ -67,9 +68,12 @@ def experiment_clips(experiment: str, lang: str, **fields: Any) -> dict[str, Cli
     if experiment not in EXPERIMENTS:
         raise SpecError(f"There is no experiment {experiment!r}; there are {', '.join(EXPERIMENTS)}.")
     names = [name for name in CONDITIONS if name.startswith(experiment)]
+    taken = sorted({"text", "lang", *condition_fields(names[0])} & set(fields))
+    if taken:
+        raise SpecError(f"The experiment sets the clips' {', '.join(taken)}; leave that out.")
     return {
-        f"{name}-{lang}-{number:02d}": ClipSpec(
-            **{"text": sentence, "lang": lang, "seed": number, **fields, **condition_fields(name)}
+        f"{name}-{lang}-{number:02d}": ClipSpec.from_dict(
+            {"text": sentence, "lang": lang, "seed": number, **fields, **condition_fields(name)}
         )
         for name in names
         for number, sentence in enumerate(scenic_sentences(lang), start=1)

@@ -1,6 +1,8 @@
 """Lineage: what made a picture, as plain JSON values, so that it can be told later and made again."""
 
 import hashlib
+import json
+from dataclasses import asdict
 from functools import cache
 from importlib import resources
 from importlib.metadata import version
@@ -15,10 +17,12 @@ from synth.expression.models import ExpressionModel
 from synth.face.assets import asset_digest
 from synth.render import RENDERER_VERSION
 from synth.speech.espeak import EspeakVoice
+from synth.speech.spoken import Speech
 
 Floats = NDArray[np.float64]
 
-_TEXT_DATA = ("function_words.json", "goals.json", "lexicon_en.json", "lexicon_zh.json", "visemes.json")
+_TEXT_DATA = ("function_words.json", "goals.json", "lexicon_en.json", "lexicon_zh.json")
+_MOTION_DATA = ("fap.json", "head_motion.json", "visemes.json")
 _TEXT_PACKAGES = ("jieba", "opencc-python-reimplemented", "pypinyin", "vadersentiment")
 
 FORMAT = 3
@@ -55,19 +59,40 @@ def expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> di
     return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
 
 
-def speech_digests(lang: str) -> dict[str, Any]:
-    """Return what a spoken clip depends on besides: the voice, and the data and programs that analyse its text."""
+def speech_digests(lang: str, *, recording: Speech | None = None) -> dict[str, Any]:
+    """Return what a spoken clip depends on besides.
+
+    That is the voice, or the recording that stands instead of it; the data and programs that analyse the text; and the
+    data that move mouth and head.
+    """
     voice = EspeakVoice(lang)
-    return {"voice": f"{voice.name} {voice.version}", "text": _text_digest()}
+    spoken = (
+        {"voice": f"{voice.name} {voice.version}"} if recording is None else {"recording": _sound_digest(recording)}
+    )
+    return {**spoken, "text": _data_digest(_TEXT_DATA, _TEXT_PACKAGES), "motion": _data_digest(_MOTION_DATA)}
+
+
+def _voice_version(lang: str) -> str:
+    voice = EspeakVoice(lang)
+    return f"{voice.name} {voice.version}"
+
+
+def _sound_digest(speech: Speech) -> str:
+    """Return the digest of sound and times; the name of the file that they come from does not count."""
+    times = [[asdict(phone) for phone in speech.phones], [asdict(span) for span in speech.words], speech.rate]
+    parts = [[asdict(span) for span in word] for word in speech.syllables]
+    found = hashlib.sha256(json.dumps([times, parts]).encode())
+    found.update(speech.samples.astype("<i2").tobytes())
+    return found.hexdigest()
 
 
 @cache
-def _text_digest() -> str:
+def _data_digest(names: tuple[str, ...], packages: tuple[str, ...] = ()) -> str:
     found = hashlib.sha256()
     folder = resources.files("synth.data")
-    for name in sorted(_TEXT_DATA):
+    for name in names:
         found.update(folder.joinpath(name).read_bytes())
-    for package in _TEXT_PACKAGES:
+    for package in packages:
         found.update(f"{package} {version(package)}".encode())
     return found.hexdigest()
 

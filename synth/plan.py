@@ -22,7 +22,7 @@ from synth.speech.sound import padded
 from synth.speech.spoken import Speech
 from synth.text.analysis import analyse
 from synth.text.sentence import Sentence
-from synth.visemes import speaking_track, unknown_symbols, viseme_track
+from synth.visemes import speaking_track, unknown_symbols, viseme_track, visemes_of
 
 Floats = NDArray[np.float64]
 
@@ -31,6 +31,12 @@ AFTERGLOW_S = 0.3
 
 REST = 0.25
 """Share of the expression that remains when a clip ends."""
+
+_HEAD_RISE_S = 0.3
+"""The head takes at least this long to join in, also where a clip has no time before the first word."""
+
+_NOD_SPEED = 120.0
+"""Degrees per second of the fastest nod: words of less than a quarter of a second, rare in the paper, nod less."""
 
 _HEAD, _LIFE = 1, 2
 """Streams of chance: what is drawn for one does not depend on the other."""
@@ -60,6 +66,8 @@ class ClipPlan:
         How the head moves; its angles begin at rest.
     faps : (T, 68) float64
         The FAP values of each frame, in FAPU.
+    recorded : bool
+        Whether the speech is a recording, which the specification does not tell.
     """
 
     spec: ClipSpec
@@ -71,6 +79,7 @@ class ClipPlan:
     words: tuple[ProsodicWord, ...]
     head: HeadMotion
     faps: Floats
+    recorded: bool = False
 
     @property
     def duration_s(self) -> float:
@@ -94,9 +103,9 @@ class ClipPlan:
             return made
         return made | {
             "sentence": self.sentence.to_dict(),
-            "words": [asdict(word) for word in self.words],
+            "words": [asdict(word) | {"syllables": list(map(asdict, word.syllables))} for word in self.words],
             "voice": self.speech.voice,
-            "phones": [asdict(phone) for phone in self.speech.phones],
+            "phones": [asdict(phone) | {"visemes": list(visemes_of(phone.symbol))} for phone in self.speech.phones],
             "unknown_phones": list(unknown_symbols(self.speech.phones)),
             "head": {"kind": self.head.kind, "units": self.head.lineage()},
         }
@@ -153,7 +162,7 @@ def plan_clip(spec: ClipSpec, models_dir: Path | None = None, *, speech: Speech 
         speaking=speaking_track(spoken.phones, **timing),
     )
     faps = mouth + head_track(head.angles, keep_gaze=True) + _life(spec, mouth)
-    return ClipPlan(spec, sentence, spoken, pad, pep, apex, words, head, faps)
+    return ClipPlan(spec, sentence, spoken, pad, pep, apex, words, head, faps, recorded=speech is not None)
 
 
 def expressed_pad(spec: ClipSpec) -> PAD:
@@ -211,9 +220,10 @@ def _head(spec: ClipSpec, words: tuple[ProsodicWord, ...], frames: int) -> HeadM
         # The speaker of Table 3 held her head raised before her camera; ours looks into it.
         statistics=replace(published_statistics(), avg_mean=np.zeros(3)),
         transition=spec.transition,
+        max_speed=_NOD_SPEED,
     )
     # All clips begin at rest, whatever moves the head then.
-    begun = Course(fps=spec.fps, neutral_s=0.0, onset_s=spec.neutral_s, hold_s=frames / spec.fps)
+    begun = Course(fps=spec.fps, neutral_s=0.0, onset_s=max(spec.neutral_s, _HEAD_RISE_S), hold_s=frames / spec.fps)
     rise = expression_track(np.ones(1), begun)[:frames]
     return replace(found, angles=found.angles * rise)
 

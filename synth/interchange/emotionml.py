@@ -110,7 +110,7 @@ def read_emotionml(path: Path) -> tuple[Sentence, dict[str, Any]]:
     if not is_own(root):
         wrong = "there is no sentence of padlab's in the <info> of the document"
         raise root.fault(wrong, "give a file that padlab wrote, or use this one as annotated text")
-    return sentence_of(root), _clip_of(root)
+    return sentence_of(root), clip_of(root)
 
 
 def read_root(path: Path) -> Element:
@@ -175,6 +175,24 @@ def sentence_of(root: Element) -> Sentence:
             wrong = f"the sentence's {_DIMENSIONS['PA'.index(name)]} is not that of its prominent word"
             raise found[0].element.fault(wrong, f"its value must be {_scale(follows)}")
     return sentence
+
+
+def clip_of(root: Element) -> dict[str, Any]:
+    """Return the clip's parameters of a document that padlab wrote.
+
+    Raises
+    ------
+    SpecError
+        If they are missing or malformed.
+    """
+    noted = _own(_only(root, NAMESPACE, "info"), "clip")
+    try:
+        clip = json.loads(noted.text)
+    except (ValueError, RecursionError):
+        clip = None
+    if not isinstance(clip, dict):
+        raise noted.fault("the clip's parameters are not a JSON object", "it must be as padlab wrote it")
+    return clip
 
 
 def _pieces(sentence: Sentence) -> Iterator[str]:
@@ -296,17 +314,6 @@ def _syllable_of(element: Element) -> TextSyllable:
     if stress not in {"true", "false"}:
         raise element.fault(f"the stress is {shown(stress)}", "it must be true or false")
     return TextSyllable(element.text, None if tone is None else int(tone), stress == "true")
-
-
-def _clip_of(root: Element) -> dict[str, Any]:
-    noted = _own(_only(root, NAMESPACE, "info"), "clip")
-    try:
-        clip = json.loads(noted.text)
-    except (ValueError, RecursionError):
-        clip = None
-    if not isinstance(clip, dict):
-        raise noted.fault("the clip's parameters are not a JSON object", "it must be as padlab wrote it")
-    return clip
 
 
 def _whole(element: Element, name: str) -> int:

@@ -6,14 +6,16 @@ with text in its ``<emotion>`` elements (`synth.interchange.emotionml`).
 
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 from synth.errors import SpecError
 from synth.files import read_text, shown
 from synth.interchange.emotionml import NAMESPACE as EMOTIONML
-from synth.interchange.emotionml import check_root, emotions_of, is_own, sentence_of
+from synth.interchange.emotionml import check_root, clip_of, emotions_of, is_own, sentence_of
 from synth.text.sentence import LANGUAGES
 from synth.xml_file import XML_NAMESPACE, Element, check_size, read_xml
 
@@ -57,6 +59,8 @@ class AnnotatedText:
         Where each of them stands: ``text[start:end]`` is the word.
     D : float or None
         Dominance of the sentence in [-1, 1]; None if the file does not tell.
+    clip : mapping, optional
+        Parameters of the clip, if it is an EmotionML file that padlab wrote.
     """
 
     text: str
@@ -64,6 +68,7 @@ class AnnotatedText:
     words: tuple[Word, ...]
     spans: tuple[tuple[int, int], ...]
     D: float | None
+    clip: Mapping[str, Any] | None = None
 
 
 def read_annotated(path: Path) -> AnnotatedText:
@@ -153,9 +158,7 @@ class _Text:
 def _read_bars(path: Path, text: str) -> AnnotatedText:
     found, options = _Text(), dict[str, str]()
     for number, line in enumerate(text.splitlines(), start=1):
-        entries = _COMMENT.sub("", line).strip()
-        # A line of one entry may have blanks in its word.
-        for entry in [entries] if entries.count("|") == 2 else entries.split():
+        for entry in _entries(_COMMENT.sub("", line)):
             option = _OPTION.fullmatch(entry)
             if option is None:
                 _add_entry(found, entry, f"{path}, line {number}")
@@ -167,6 +170,13 @@ def _read_bars(path: Path, text: str) -> AnnotatedText:
     if not found.words:
         raise SpecError(f"{path}: has no words; give lines such as word|0|0.5.")
     return found.result(options.get("lang"), float(options["D"]) if "D" in options else None)
+
+
+def _entries(line: str) -> list[str]:
+    """Return the options that a line begins with, and its words; a word that is alone may have blanks."""
+    options = list(takewhile(_OPTION.fullmatch, line.split()))
+    words = " ".join(line.split()[len(options) :])
+    return [*options, *([words] if words.count("|") == 2 else words.split())]
 
 
 def _add_entry(found: _Text, entry: str, where: str) -> None:
@@ -307,7 +317,7 @@ def _read_emotionml(root: Element) -> AnnotatedText:
         sentence = sentence_of(root)
         words = tuple((word.text, word.P, word.A) for word in sentence.words)
         spans = tuple((word.start, word.end) for word in sentence.words)
-        return AnnotatedText(sentence.text, sentence.lang, words, spans, sentence.D)
+        return AnnotatedText(sentence.text, sentence.lang, words, spans, sentence.D, clip_of(root))
     found, D = _Text(), None
     for emotion in emotions_of(root):
         if emotion.text:

@@ -50,8 +50,9 @@ def _render(spec: ClipSpec, file: Path, folder: Path, models_dir: Path) -> bool:
     sidecar = file.with_suffix(".json")
     if file.is_file() and _digest_in(sidecar) == clip_digest(spec, folder, models_dir):
         return False
+    # Without it the clip counts as not there, whatever was begun: it goes first and comes last.
+    sidecar.unlink(missing_ok=True)
     made = render_clip(spec, file, folder, models_dir)
-    # Written last: without it the clip counts as not there.
     write_whole(sidecar, json.dumps(made, ensure_ascii=False, indent=1))
     return True
 

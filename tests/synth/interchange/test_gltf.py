@@ -13,7 +13,8 @@ import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from synth.clip import ClipSpec, clip_faps
+from synth.clip_spec import ClipSpec
+from synth.plan import plan_clip
 from synth.errors import SpecError, VideoError
 from synth.face.deformation import solve
 from synth.face.mesh import MORPH_NAMES
@@ -171,7 +172,7 @@ class Glb:
 @pytest.fixture(scope="module")
 def faps() -> np.ndarray:
     """Five seconds of a smile with speech-like jaw, a turning head, wandering eyes and growing pupils."""
-    values = clip_faps(ClipSpec(pad=(0.55, 0.24, 0.28), hold_s=4.1))
+    values = plan_clip(ClipSpec(pad=(0.55, 0.24, 0.28), hold_s=4.1)).faps
     t = np.arange(len(values)) / 25
     for fap, course in {3: 120 * np.sin(9 * t) ** 2, 23: 15000 * np.sin(3 * t), 24: 15000 * np.sin(3 * t)}.items():
         values[:, column(fap)] += course

@@ -29,6 +29,9 @@ def test_figures_have_their_names_and_agree(figures: dict[str, float]) -> None:
         "render.ratio_to_naive",
         "render.peak_memory_mb_1s",
         "render.peak_memory_mb_2s",
+        "say.realtime_factor",
+        "say.clip_seconds",
+        "text.ms_per_sentence",
     }
     assert set(figures) == expected
     assert all(value > 0 for value in figures.values())
@@ -36,6 +39,7 @@ def test_figures_have_their_names_and_agree(figures: dict[str, float]) -> None:
     assert figures["render.realtime_factor"] == pytest.approx(figures["render.frames_per_second"] / 25, abs=0.01)
     ratio = figures["render.frames_per_second"] / figures["render.naive_frames_per_second"]
     assert figures["render.ratio_to_naive"] == pytest.approx(ratio, rel=0.01)
+    assert 8 < figures["say.clip_seconds"] < 13
 
 
 def test_measured_face_never_rests() -> None:

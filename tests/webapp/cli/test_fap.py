@@ -88,7 +88,7 @@ def test_check_tells_what_is_ignored(run: object, tmp_path: Path) -> None:
 def test_say_writes_all_its_files(run: object, tmp_path: Path) -> None:
     names = {"--fap": "a.fap", "--arkit": "a.csv", "--gltf": "a.glb", "--lineage": "a.json", "--out": "a.mp4"}
     options = [part for option, name in names.items() for part in (option, str(tmp_path / name))]
-    result = run("say", "Yes.", "--size", "96x80", *options)
+    result = run("say", "Yes.", "--mute", "--size", "96x80", *options)
     assert result.exit_code == 0, result.output
     assert sorted(path.name for path in tmp_path.glob("a.*")) == sorted(names.values())
     assert all(f"Written: {tmp_path / name}" in result.output for name in names.values())
