@@ -14,13 +14,13 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from synth.clip_spec import ClipSpec
-from synth.plan import plan_clip
 from synth.errors import SpecError, VideoError
 from synth.face.deformation import solve
 from synth.face.mesh import MORPH_NAMES
 from synth.face.motion import Motion
 from synth.fap.table import column
 from synth.interchange.gltf import MAX_COMPONENTS, write_gltf
+from synth.plan import plan_clip
 
 TYPES = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
