@@ -15,6 +15,7 @@ from synth.expression.pep import PEP_COUNT
 from synth.expression.pep_fap import PepFapModel, template
 from synth.expression.samples import check_pad
 from synth.expression.word_table import TableModel, word_table
+from synth.fap.table import within_reach
 
 Floats = NDArray[np.float64]
 
@@ -48,9 +49,12 @@ class ExpressionModel:
     pep_fap: PepFapModel
 
     def apex(self, pad: NDArray[np.floating] | Floats, *, intensity: float = 1.0) -> tuple[Floats, Floats]:
-        """Return the PEPs (N, 9) and FAPs (N, 68) of PAD values (N, 3), both times the intensity."""
+        """Return the PEPs (N, 9) and FAPs (N, 68) of PAD values (N, 3), both times the intensity.
+
+        FAPs stay within the face's reach (`synth.fap.table.within_reach`).
+        """
         pep = intensity * self.pad_pep.predict(pad)
-        return pep, self.pep_fap.translate(pep)
+        return pep, within_reach(self.pep_fap.translate(pep))
 
 
 @dataclass(frozen=True)

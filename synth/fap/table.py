@@ -20,6 +20,9 @@ Floats = NDArray[np.float64]
 
 FAP_COUNT = 68
 
+_BEYOND_USABLE = 1.1
+_LOWER_LIP = [fap - 1 for fap in (5, 10, 11, 52, 57, 58)]
+
 _DIRECTIONS = {
     "left": (1.0, 0.0, 0.0),
     "right": (-1.0, 0.0, 0.0),
@@ -130,11 +133,33 @@ def check_sequence(values: NDArray[np.floating] | Floats) -> Floats:
     return sequence
 
 
+def within_reach(values: Floats) -> Floats:
+    """Return FAP values (T, 68) cut to a tenth beyond their usable ranges, as far as a face can look natural.
+
+    The usable range is that of a face on which nothing else moves: the lower lip, which an open jaw carries, may go as
+    much farther down as the jaw does (FAP 3, in the same unit).
+    """
+    sequence = check_sequence(values)
+    low, high = _reach()
+    carried = np.zeros_like(sequence)
+    carried[:, _LOWER_LIP] = np.clip(sequence[:, [column(3)]], 0.0, high[column(3)])
+    return np.clip(sequence, low - carried, high)
+
+
 def mirrored(values: Floats) -> Floats:
     """Return a (T, 68) sequence as the same face in a mirror would need it."""
     sequence = check_sequence(values)
     order, signs = _mirror()
     return sequence[:, order] * signs
+
+
+@cache
+def _reach() -> tuple[Floats, Floats]:
+    low, high = np.full(FAP_COUNT, -np.inf), np.full(FAP_COUNT, np.inf)
+    for fap in faps().values():
+        if fap.usable is not None:
+            low[column(fap.fap)], high[column(fap.fap)] = (_BEYOND_USABLE * end for end in fap.usable)
+    return low, high
 
 
 @cache

@@ -48,9 +48,11 @@ def still(text, lang="en", **given_fields):
 
 
 def limits(made):
-    """Return what each FAP may reach: a tenth beyond its usable range, or as far as the expression's apex asks for."""
+    """Return what each FAP may reach: a tenth beyond its usable range."""
     usable = np.array([faps()[fap].usable or (-np.inf, np.inf) for fap in range(1, FAP_COUNT + 1)])
-    low, high = np.minimum(1.1 * usable[:, 0], made.apex), np.maximum(1.1 * usable[:, 1], made.apex)
+    low, high = 1.1 * usable[:, 0], 1.1 * usable[:, 1]
+    # The lower lip, which an open jaw carries, goes as much farther down.
+    low[[column(fap) for fap in (5, 10, 11, 52, 57, 58)]] -= 1.1 * usable[column(3), 1]
     for lid in LIDS:
         # Lids that shut go as far as the lower ones leave them to.
         high[column(lid)] = max(high[column(lid)], 1024.0 - min(made.apex[column(21)], made.apex[column(22)], 0.0))

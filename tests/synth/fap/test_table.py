@@ -2,9 +2,11 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from synth.errors import SpecError
-from synth.fap.table import FAP_COUNT, check_sequence, column, faps, mirrored
+from synth.fap.table import FAP_COUNT, check_sequence, column, faps, mirrored, within_reach
 
 
 def test_there_are_68_in_ten_groups():
@@ -82,3 +84,31 @@ def test_sequences_are_checked():
     values[1, 4] = np.nan
     with pytest.raises(SpecError, match="FAP 5 in frame 1"):
         check_sequence(values)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_within_reach_cuts_what_a_face_cannot_do(seed):
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(5, 68)) * 10.0 ** rng.integers(0, 6)
+    found = within_reach(values)
+    jaw = found[:, column(3)]
+    for fap in faps().values():
+        if fap.usable is None:
+            np.testing.assert_array_equal(found[:, column(fap.fap)], values[:, column(fap.fap)])
+            continue
+        carried = np.maximum(jaw, 0.0) if fap.fap in {5, 10, 11, 52, 57, 58} else 0.0
+        low, high = (1.1 * end for end in fap.usable)
+        assert (found[:, column(fap.fap)] >= low - carried - 1e-9).all()
+        assert (found[:, column(fap.fap)] <= high + 1e-9).all()
+    np.testing.assert_array_equal(within_reach(found), found)
+
+
+def test_within_reach_leaves_natural_faces_alone():
+    half = np.array([[0.5 * (faps()[k].usable or (0, 0))[side] for k in range(1, 69)] for side in (0, 1)])
+    np.testing.assert_array_equal(within_reach(half), half)
+    # An open mouth: the lip goes with the jaw.
+    mouth = np.zeros((1, 68))
+    mouth[0, [column(3), column(5)]] = 1000.0, -1500.0
+    np.testing.assert_array_equal(within_reach(mouth), mouth)
+    mouth[0, column(3)] = 0.0
+    assert within_reach(mouth)[0, column(5)] == pytest.approx(1.1 * faps()[5].usable[0])
