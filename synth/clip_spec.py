@@ -12,9 +12,7 @@ from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
 from synth.head.trajectory import KINDS as HEAD_KINDS
 from synth.head.trajectory import TRANSITIONS
 from synth.pad import PAD
-from synth.text.sentence import LANGUAGES
-
-MAX_TEXT = 2000
+from synth.text.sentence import LANGUAGES, LONGEST_TEXT
 
 INTENSITIES = (0.0, 1.5)
 """Least and largest factor of an expression."""
@@ -172,8 +170,8 @@ def real(name: str, value: object, low: float, high: float) -> float:
 def _check_text(text: object) -> None:
     if not isinstance(text, str):
         raise SpecError(f"Clip: text is {text!r}, but must be a string.")
-    if len(text) > MAX_TEXT:
-        raise SpecError(f"Clip: text has {len(text)} characters, but at most {MAX_TEXT} are spoken in one clip.")
+    if len(text) > LONGEST_TEXT:
+        raise SpecError(f"Clip: text has {len(text)} characters, but at most {LONGEST_TEXT} are spoken in one clip.")
     for char in text:
         if unicodedata.category(char) in {"Cc", "Cs"} and char not in "\t\n\r":
             raise SpecError(f"Clip: text contains the character U+{ord(char):04X}, but must be printable text.")

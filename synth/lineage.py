@@ -72,11 +72,6 @@ def speech_digests(lang: str, *, recording: Speech | None = None) -> dict[str, A
     return {**spoken, "text": _data_digest(_TEXT_DATA, _TEXT_PACKAGES), "motion": _data_digest(_MOTION_DATA)}
 
 
-def _voice_version(lang: str) -> str:
-    voice = EspeakVoice(lang)
-    return f"{voice.name} {voice.version}"
-
-
 def _sound_digest(speech: Speech) -> str:
     """Return the digest of sound and times; the name of the file that they come from does not count."""
     times = [[asdict(phone) for phone in speech.phones], [asdict(span) for span in speech.words], speech.rate]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synth.clip_spec import ClipSpec
-from synth.expression.course import Course, expression_track
+from synth.expression.course import Course, blink_track, expression_track
 from synth.expression.life import life_track
 from synth.expression.models import ExpressionModel, load_model
 from synth.fap.blend import blend
@@ -38,7 +38,7 @@ _HEAD_RISE_S = 0.3
 _NOD_SPEED = 120.0
 """Degrees per second of the fastest nod: words of less than a quarter of a second, rare in the paper, nod less."""
 
-_HEAD, _LIFE = 1, 2
+_HEAD, _LIFE, _BLINKS = 1, 2, 3
 """Streams of chance: what is drawn for one does not depend on the other."""
 
 
@@ -207,7 +207,11 @@ def _silent(spec: ClipSpec, pad: PAD, pep: Floats, apex: Floats) -> ClipPlan:
     course = Course(fps=spec.fps, neutral_s=spec.neutral_s, onset_s=spec.onset_s, hold_s=spec.hold_s)
     expression = expression_track(apex, course)
     still = head_motion((), rng=_rng(spec, _HEAD), kind="static", fps=spec.fps, duration_s=len(expression) / spec.fps)
-    return ClipPlan(spec, None, None, pad, pep, apex, (), still, expression + _life(spec, expression))
+    # An expression is rated as a whole: nothing blinks on the way to it, and no end finds the eyes half shut.
+    life = _life(replace(spec, blinks=False), expression)
+    if spec.blinks:
+        life += blink_track(expression, course, _rng(spec, _BLINKS))
+    return ClipPlan(spec, None, None, pad, pep, apex, (), still, expression + life)
 
 
 def _head(spec: ClipSpec, words: tuple[ProsodicWord, ...], frames: int) -> HeadMotion:

@@ -221,15 +221,7 @@ def fit_set(
             kind: Calibration.of(model, samples.pad[training], pep[training], reliability=samples.reliability)
             for kind, model in final.items()
         },
-        origin={
-            "data": samples.name,
-            "pseudo": samples.pseudo,
-            "note": samples.note,
-            "samples": len(samples.pad),
-            "data_digest": samples.digest,
-            "seed": seed,
-            "evaluation": evaluation.to_dict(),
-        },
+        origin=_origin(samples, seed, evaluation),
     )
     return models, evaluation
 
@@ -249,6 +241,18 @@ def plain(values: Floats | float) -> Any:
     if isinstance(values, np.ndarray):
         return [plain(value) for value in values.tolist()]
     return float(values) if np.isfinite(values) else None
+
+
+def _origin(samples: Samples, seed: int, evaluation: SetEvaluation) -> dict[str, Any]:
+    return {
+        "data": samples.name,
+        "pseudo": samples.pseudo,
+        "note": samples.note,
+        "samples": len(samples.pad),
+        "data_digest": samples.digest,
+        "seed": seed,
+        "evaluation": evaluation.to_dict(),
+    }
 
 
 def _held_out(samples: Samples, pep: Floats, hidden: int, seed: int) -> dict[str, float]:

@@ -14,11 +14,8 @@ from synth.text.appraisal import appraise
 from synth.text.english import Transcriber
 from synth.text.intent import goal_of
 from synth.text.scanning import has_chinese
-from synth.text.sentence import LANGUAGES, Sentence, TextSyllable, TextWord
+from synth.text.sentence import LANGUAGES, LONGEST_TEXT, Sentence, TextSyllable, TextWord
 from synth.text.token import Token
-
-LONGEST_TEXT = 2000
-"""Characters of the longest text that is analysed."""
 
 _NAMES = {"en": "English", "zh": "Chinese"}
 _LETTER = re.compile("[^\\W_]")

@@ -8,6 +8,9 @@ from synth.pad import PAD
 
 LANGUAGES = ("en", "zh")
 
+LONGEST_TEXT = 2000
+"""Characters of the longest text that is analysed and spoken."""
+
 
 @dataclass(frozen=True, slots=True)
 class TextSyllable:

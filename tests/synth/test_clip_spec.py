@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synth.clip_spec import MAX_TEXT, ClipSpec
+from synth.clip_spec import ClipSpec
 from synth.errors import SpecError
+from synth.text.sentence import LONGEST_TEXT
 
 level = st.none() | st.floats(-1, 1)
 specs = st.builds(
@@ -95,7 +96,7 @@ def test_wrong_levels_of_dominance_and_words_are_refused(value):
 
 
 def test_texts_may_be_long_and_have_lines():
-    assert len(ClipSpec(text="字" * MAX_TEXT).text) == 2000
+    assert len(ClipSpec(text="字" * LONGEST_TEXT).text) == 2000
     assert ClipSpec(text="a\tb\r\nc").text == "a\tb\r\nc"
 
 

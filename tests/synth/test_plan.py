@@ -371,3 +371,13 @@ def test_another_process_makes_the_same_plan():
     said = subprocess.run(command, capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": "77"}).stdout
     made = plan_clip(spec)
     assert said.strip() == hashlib.sha256(made.faps.tobytes() + made.speech.samples.tobytes()).hexdigest()
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_silent_expressions_blink_in_the_hold_alone(seed):
+    """What raters see of a face is its expression: no blink on the way to it, none that the end cuts off."""
+    spec = ClipSpec(pad=(0.55, 0.24, 0.28), seed=seed, gaze=False)
+    blinks = plan_clip(spec).faps - plan_clip(replace(spec, blinks=False)).faps
+    begun = round((spec.neutral_s + spec.onset_s) * spec.fps)
+    assert not blinks[:begun].any()
+    assert not blinks[-1].any()

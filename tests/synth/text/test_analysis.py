@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synth.errors import SpecError
-from synth.text.analysis import LONGEST_TEXT, analyse
+from synth.text.analysis import analyse
+from synth.text.sentence import LONGEST_TEXT
 from synth.text.syllabification import syllable_count
 
 PEAK = "太平山頂是香港最受歡迎的名勝景點，登臨其間，可俯瞰山下鱗次櫛比的摩天高樓和享譽全球的維多利亞港景色。"
