@@ -56,7 +56,7 @@ def _digests(
     spec: ClipSpec, face_dir: Path, models_dir: Path | None, *, recording: Speech | None = None
 ) -> dict[str, Any]:
     own = digests(load_model(spec.model, models_dir), face_dir)
-    return own | (speech_digests(spec.lang, recording=recording) if spec.text.strip() else {})
+    return own | (speech_digests(spec.lang, voice=spec.voice, recording=recording) if spec.text.strip() else {})
 
 
 def render_clip(

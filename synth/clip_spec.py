@@ -12,6 +12,7 @@ from synth.face.identity import DEFAULT_IDENTITY, IDENTITIES
 from synth.head.trajectory import KINDS as HEAD_KINDS
 from synth.head.trajectory import TRANSITIONS
 from synth.pad import PAD
+from synth.speech.voices import DEFAULT_VOICE, check_voice
 from synth.text.sentence import LANGUAGES, LONGEST_TEXT
 
 INTENSITIES = (0.0, 1.5)
@@ -40,6 +41,8 @@ class ClipSpec:
         The sentence, up to 2000 characters; empty for an expression without speech.
     lang : {"en", "zh"}
         Language of the text.
+    voice : str
+        Who speaks, one of `synth.speech.voices.VOICES` that speaks the language.
     words : tuple of (str, float or None, float or None)
         Prosodic words with P and A that are given instead of found, see `synth.text.analysis.analyse`.
     dominance : float or None
@@ -81,6 +84,7 @@ class ClipSpec:
 
     text: str = ""
     lang: str = "en"
+    voice: str = DEFAULT_VOICE
     words: tuple[tuple[str, float | None, float | None], ...] = ()
     dominance: float | None = None
     pad: tuple[float, float, float] | None = None
@@ -111,6 +115,7 @@ class ClipSpec:
             "identity": tuple(IDENTITIES),
         }.items():
             check_choice(name, getattr(self, name), choices)
+        check_voice(self.voice, self.lang)
         check_model_name(self.model)
         # Equal specifications must be written alike, so 1 becomes 1.0 and -0.0 becomes 0.0.
         if self.pad is not None:

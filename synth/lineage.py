@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from synth.expression.models import ExpressionModel
 from synth.face.assets import asset_digest
 from synth.render import RENDERER_VERSION
-from synth.speech.espeak import EspeakVoice
 from synth.speech.spoken import Speech
+from synth.speech.voices import DEFAULT_VOICE, make_voice
 
 Floats = NDArray[np.float64]
 
@@ -59,17 +59,27 @@ def expression(pad: tuple[float, float, float], pep: Floats, apex: Floats) -> di
     return {"pad": list(pad), "pep": pep.tolist(), "fap": faps}
 
 
-def speech_digests(lang: str, *, recording: Speech | None = None) -> dict[str, Any]:
+def speech_digests(lang: str, *, voice: str = DEFAULT_VOICE, recording: Speech | None = None) -> dict[str, Any]:
     """Return what a spoken clip depends on besides.
 
     That is the voice, or the recording that stands instead of it; the data and programs that analyse the text; and the
     data that move mouth and head.
+
+    Raises
+    ------
+    SpecError, SpeechError
+        If there is no such voice for the language, or it is not installed.
     """
-    voice = EspeakVoice(lang)
-    spoken = (
-        {"voice": f"{voice.name} {voice.version}"} if recording is None else {"recording": _sound_digest(recording)}
-    )
-    return {**spoken, "text": _data_digest(_TEXT_DATA, _TEXT_PACKAGES), "motion": _data_digest(_MOTION_DATA)}
+    return {
+        **(_voice_digest(voice, lang) if recording is None else {"recording": _sound_digest(recording)}),
+        "text": _data_digest(_TEXT_DATA, _TEXT_PACKAGES),
+        "motion": _data_digest(_MOTION_DATA),
+    }
+
+
+def _voice_digest(name: str, lang: str) -> dict[str, str]:
+    voice = make_voice(name, lang)
+    return {"voice": f"{voice.name} {voice.version}"}
 
 
 def _sound_digest(speech: Speech) -> str:

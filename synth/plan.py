@@ -1,7 +1,6 @@
 """The plan of a clip: from its specification to the FAPs of each frame, with all that they were made of."""
 
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +16,9 @@ from synth.head.published import published_statistics
 from synth.head.trajectory import HeadMotion, head_motion, head_track
 from synth.head.words import ProsodicWord, Syllable
 from synth.pad import PAD
-from synth.speech.espeak import EspeakVoice
 from synth.speech.sound import padded
 from synth.speech.spoken import Speech
+from synth.speech.voices import make_voice
 from synth.text.analysis import analyse
 from synth.text.sentence import Sentence
 from synth.visemes import speaking_track, unknown_symbols, viseme_track, visemes_of
@@ -141,7 +140,7 @@ def plan_clip(spec: ClipSpec, models_dir: Path | None = None, *, speech: Speech 
     pep, apex = _apex(pad, model, spec.intensity)
     if sentence is None:
         return _silent(spec, pad, pep, apex)
-    said = speech or _voice(spec.lang).speak(sentence)
+    said = speech or make_voice(spec.voice, spec.lang).speak(sentence)
     spoken = padded(said, before_s=spec.neutral_s)
     course = Course(
         fps=spec.fps,
@@ -243,8 +242,3 @@ def _rng(spec: ClipSpec, stream: int) -> np.random.Generator:
 def _apex(pad: PAD, model: ExpressionModel, intensity: float) -> tuple[Floats, Floats]:
     pep, faps = model.apex(np.array([pad.as_tuple()]), intensity=intensity)
     return pep[0], faps[0]
-
-
-@lru_cache(maxsize=2)
-def _voice(lang: str) -> EspeakVoice:
-    return EspeakVoice(lang)

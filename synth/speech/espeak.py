@@ -23,15 +23,14 @@ from pypinyin import Style, lazy_pinyin
 from synth.errors import SpecError, SpeechError
 from synth.speech import espeak_process
 from synth.speech.alignment import align
+from synth.speech.saying import check_sentence, silent_speech, spoken_text
 from synth.speech.segments import ESPEAK_LANGUAGES, Segment, Sound, read_events, read_phonemes, syllable_sizes
-from synth.speech.spoken import SILENCE, Phone, Speech
+from synth.speech.spoken import Speech
 from synth.text.english import tokens
 from synth.text.sentence import LANGUAGES, Sentence, TextWord
 
 RATE_WPM = 175
 PITCH = 50
-EMPTY_S = 0.5
-"""Seconds of silence that a sentence without words lasts."""
 
 _SAMPLE_RATE = 22050
 _LIBRARY = re.compile(r"(lib)?espeak-ng\.(so|dylib|dll)")
@@ -39,11 +38,7 @@ _INSIDE_WORDS = "'’-."
 _CHINESE = re.compile("[\u3400-\u9fff]")
 _IONG = re.compile(r"[jqx]iong[1-5]")
 _TIMEOUT_S = 120.0
-_LONGEST = 20_000
 _KEPT_TRANSCRIPTIONS = 50_000
-
-# Between words only what makes a pause is of use; of several signs the strongest counts.
-_PAUSES = ("。！？!?.…", "；：;:—–", "，、,")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,13 +119,10 @@ class EspeakVoice:
         SpeechError
             If eSpeak NG cannot be started, or has no sound for the sentence.
         """
-        if sentence.lang != self.lang:
-            raise SpecError(f"The voice speaks {self.lang!r}; the sentence is in {sentence.lang!r}.")
-        if len(sentence.text) > _LONGEST:
-            raise SpecError(f"The sentence has {len(sentence.text)} characters; give at most {_LONGEST}.")
+        check_sentence(sentence, self.lang)
         if not sentence.words:
-            return _silence(f"{self.name} ({self.version})")
-        text, places, words = _spoken_text(sentence)
+            return silent_speech(f"{self.name} ({self.version})", _SAMPLE_RATE)
+        text, places, words = spoken_text(sentence, _english if self.lang == "en" else _chinese)
         said = _utterance(
             text, words, lang=self._espeak_lang, voice=self._voice, rate_wpm=self.rate_wpm, pitch=self.pitch
         )
@@ -195,33 +187,7 @@ def _espeak_name(lang: str) -> str:
     return ESPEAK_LANGUAGES[lang]
 
 
-def _silence(voice: str) -> Speech:
-    """Return the speech of a sentence without words."""
-    count = round(EMPTY_S * _SAMPLE_RATE)
-    pause = Phone(SILENCE, 0.0, count / _SAMPLE_RATE)
-    return Speech((pause,), (), (), np.zeros(count, np.int16), _SAMPLE_RATE, voice)
-
-
-def _spoken_text(sentence: Sentence) -> tuple[str, list[int], tuple[str, ...]]:
-    """Return the text to say, for each of its characters the place in the sentence's text, and its words.
-
-    Between the words there are blanks and at most one sign of a pause.
-    """
-    pieces: list[str] = []
-    words: list[str] = []
-    for word in sentence.words:
-        done = len(pieces)
-        pieces.extend(_gap(sentence.text[done : word.start], first=done == 0))
-        text = sentence.text[len(pieces) : word.end]
-        said = _english(text) if sentence.lang == "en" else _chinese(text, word, "".join(pieces[-1:]))
-        pieces.extend(said)
-        words.append("".join(said))
-    pieces.extend(_gap(sentence.text[len(pieces) :], first=False))
-    places = [place for place, piece in enumerate(pieces) for _ in piece]
-    return "".join(pieces), places, tuple(words)
-
-
-def _english(text: str) -> list[str]:
+def _english(text: str, _word: TextWord, _before: str) -> list[str]:
     """Return what to say for each character of a word: numbers and symbols as the analysis reads them."""
     pieces = _sayable(text, "en")
     for token in tokens(text):
@@ -237,18 +203,6 @@ def _chinese(text: str, word: TextWord, before: str) -> list[str]:
     if text and not text.isalpha() and all(map(_CHINESE.fullmatch, syllables)):
         return ["".join(_sayable("".join(syllables), "zh", before)), *([""] * (len(text) - 1))]
     return _sayable(text, "zh", before)
-
-
-def _gap(text: str, *, first: bool) -> str:
-    """Return blanks for the text between words, with its strongest sign of a pause kept in its place."""
-    blank = " " * len(text)
-    if first:
-        return blank
-    for signs in _PAUSES:
-        place = next((place for place, sign in enumerate(text) if sign in signs), None)
-        if place is not None:
-            return blank[:place] + text[place] + blank[place + 1 :]
-    return blank
 
 
 def _sayable(text: str, lang: str, before: str = "") -> list[str]:

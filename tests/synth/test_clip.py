@@ -25,7 +25,7 @@ OTHER = {
     **{"text": "Hello", "lang": "zh", "words": (("a", 1.0, 1.0),), "dominance": 0.0, "pad": (0.1, 0.0, 0.0)},
     **{"model": "linear", "intensity": 0.9, "head": "static", "transition": "average", "delta": 0.6, "mute": True},
     **{"blinks": False, "gaze": False, "identity": "erik", "width": 722, "height": 578, "fps": 30, "neutral_s": 0.5},
-    **{"onset_s": 0.6, "hold_s": 1.7, "offset_s": 0.5, "seed": 1},
+    **{"onset_s": 0.6, "hold_s": 1.7, "offset_s": 0.5, "seed": 1, "voice": "hibari"},
 }
 
 

@@ -49,6 +49,14 @@ def test_canonical_texts_are_equal_only_for_equal_specifications(one, other):
     assert one.canonical().isascii()
 
 
+def test_a_voice_that_speaks_the_language():
+    spec = ClipSpec(voice="hibari")
+    assert ClipSpec.from_dict(json.loads(spec.canonical())) == spec
+    assert spec.canonical() != ClipSpec().canonical()
+    with pytest.raises(SpecError, match="'hibari' does not speak 'zh'; what does: espeak"):
+        ClipSpec(voice="hibari", lang="zh")
+
+
 def test_the_canonical_text_has_every_field():
     assert set(json.loads(ClipSpec().canonical())) == {field.name for field in fields(ClipSpec)}
 
@@ -65,7 +73,13 @@ def test_equal_numbers_of_another_type_are_written_alike():
     [
         *[("text", None, "must be a string"), ("text", "a" * 2001, "2001 characters"), ("text", "a\x00b", r"U\+0000")],
         *[("text", "a\ud800", r"U\+D800"), ("text", "a\x85", r"U\+0085")],
-        *[("lang", "fr", "en, zh"), ("pad", (0, 0, 1.01), "D is 1.01"), ("pad", (0, 0), "three")],
+        *[
+            ("voice", "nobody", "espeak, hibari"),
+            ("voice", None, "no voice None"),
+            ("lang", "fr", "en, zh"),
+            ("pad", (0, 0, 1.01), "D is 1.01"),
+            ("pad", (0, 0), "three"),
+        ],
         *[("pad", (0, 0, float("nan")), "D is nan"), ("pad", "000", "three numbers")],
         *[("model", "ann2", "table, ann"), ("intensity", 1.6, "from 0 to 1.5"), ("intensity", "1", "number")],
         *[("intensity", float("nan"), "number"), ("intensity", 10**400, "from 0 to 1.5")],

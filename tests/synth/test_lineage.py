@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from synth import lineage
+from synth.errors import SpecError
 from synth.expression.models import load_model
 from synth.lineage import digests, picture_digests, speech_digests, versions
+from synth.speech.espeak import EspeakVoice
 from synth.speech.spoken import Phone, Span, Speech
 
 RECORDING = Speech(
@@ -67,8 +69,16 @@ def test_the_programs_that_analyse_text_count(data, monkeypatch, package):
 
 def test_the_voice_counts(monkeypatch):
     before = speech_digests("en")
-    monkeypatch.setattr(lineage.EspeakVoice, "version", "0.1")
+    monkeypatch.setattr(EspeakVoice, "version", "0.1")
     assert speech_digests("en")["voice"] != before["voice"]
+
+
+def test_another_voice_counts():
+    found = speech_digests("en", voice="hibari")
+    assert found["voice"].startswith("hibari heart 0.2.1, onnxruntime ")
+    assert {key for key, value in speech_digests("en").items() if found[key] != value} == {"voice"}
+    with pytest.raises(SpecError, match="does not speak 'zh'"):
+        speech_digests("zh", voice="hibari")
 
 
 def test_a_recording_counts_by_its_sound_and_times():

@@ -308,6 +308,16 @@ def recording(speech):
     )
 
 
+def test_the_voice_of_the_specification_speaks():
+    plain = plan(ENGLISH)
+    made = plan_clip(replace(plain.spec, voice="hibari"))
+    assert made.lineage()["voice"].startswith("hibari heart (")
+    assert plain.lineage()["voice"].startswith("espeak-ng ")
+    assert made.lineage()["unknown_phones"] == []
+    assert [word.text for word in made.words] == [word.text for word in plain.words]
+    check_track(made)
+
+
 def test_a_recording_stands_instead_of_the_voice():
     spoken = plan(ENGLISH)
     made = plan_clip(spoken.spec, speech=recording(spoken.speech))

@@ -25,7 +25,7 @@ from synth.face.rig import Rig
 from synth.fap.table import column
 from synth.plan import plan_clip
 from synth.render import Renderer
-from synth.speech.espeak import forget_speech
+from synth.speech.voices import forget_speech
 from synth.text.analysis import guess_language
 from synth.video import VideoWriter
 from webapp.cli.bench_training import train

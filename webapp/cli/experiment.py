@@ -12,7 +12,7 @@ from synth.experiments import EXPERIMENTS, experiment_clips
 from synth.files import write_whole
 from synth.text.sentence import LANGUAGES
 from webapp.cli.context import progress_bar
-from webapp.cli.options import end_on_signals, face_dir, identity_option, size_option
+from webapp.cli.options import end_on_signals, face_dir, identity_option, size_option, voice_option
 from webapp.config import Settings
 
 
@@ -22,10 +22,13 @@ from webapp.config import Settings
 @click.option(
     "--lang", type=click.Choice(LANGUAGES), default="zh", show_default=True, help="Language of the sentences."
 )
+@voice_option
 @click.option("--mute", is_flag=True, help="Without sound; the timing stays.")
 @identity_option
 @size_option
-def experiment(*, name: str, out: Path, lang: str, mute: bool, identity: str, size: tuple[int, int]) -> None:
+def experiment(
+    *, name: str, out: Path, lang: str, voice: str, mute: bool, identity: str, size: tuple[int, int]
+) -> None:
     """Render an experiment of MTAP 2013, Table 9: three conditions, twenty sentences about scenic spots each.
 
     Beside each clip is its lineage (JSON). A clip that is there already is not rendered again, so that the command goes
@@ -33,7 +36,7 @@ def experiment(*, name: str, out: Path, lang: str, mute: bool, identity: str, si
     """
     end_on_signals()
     models_dir = Settings.from_env().models_dir
-    clips = experiment_clips(name, lang, identity=identity, mute=mute, width=size[0], height=size[1])
+    clips = experiment_clips(name, lang, voice=voice, identity=identity, mute=mute, width=size[0], height=size[1])
     out.mkdir(parents=True, exist_ok=True)
     folder = face_dir()
     rendered = 0

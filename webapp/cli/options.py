@@ -12,6 +12,7 @@ from synth.errors import SynthError
 from synth.expression.models import DEFAULT_MODEL, MODEL_NAMES, check_model_name
 from synth.face import assets
 from synth.face.identity import DEFAULT_IDENTITY
+from synth.speech.voices import DEFAULT_VOICE, VOICES
 from webapp.config import Settings
 from webapp.errors import ConfigError
 
@@ -35,6 +36,13 @@ FILE = click.Path(path_type=Path, dir_okay=False)
 identity_option = click.option("--identity", default=DEFAULT_IDENTITY, show_default=True, help="Whose face.")
 size_option = click.option(
     "--size", type=SizeType(), default="720x576", show_default=True, help="Size of the picture in pixels."
+)
+voice_option = click.option(
+    "--voice",
+    type=click.Choice(list(VOICES)),
+    default=DEFAULT_VOICE,
+    show_default=True,
+    help="Who speaks; hibari (English only) needs padlab[voice].",
 )
 
 

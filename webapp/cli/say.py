@@ -34,12 +34,13 @@ from webapp.cli.options import (
     face_dir,
     identity_option,
     size_option,
+    voice_option,
 )
 from webapp.config import Settings
 from webapp.errors import NotFoundError
 
 FIELDS = {"face_model": "model"} | {
-    name: name for name in ("lang", "pad", "head", "intensity", "delta", "mute", "identity", "seed")
+    name: name for name in ("lang", "voice", "pad", "head", "intensity", "delta", "mute", "identity", "seed")
 }
 """Options to the fields of the clip that they set."""
 
@@ -115,6 +116,7 @@ lang_option = click.option(
     help="Viseme's share (Eq. 14).",
 )
 @click.option("--still", is_flag=True, help="Without blinks and small shifts of gaze.")
+@voice_option
 @click.option("--mute", is_flag=True, help="Without sound; the timing stays.")
 @click.option("--audio", type=FILE, help="Recorded speech (WAV) instead of a voice; with --align.")
 @click.option("--align", type=FILE, help="When its phones are heard (CSV).")

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from synth.errors import SpecError, SpeechError
 from synth.speech import espeak
 from synth.speech.espeak import EspeakVoice, transcribe
+from synth.speech.saying import EMPTY_S
 from synth.speech.spoken import SILENCE
 from synth.text.sentence import Sentence, TextSyllable, TextWord
 
@@ -170,7 +171,7 @@ def test_fewer_syllables_than_vowels():
 def test_a_sentence_without_words_is_silence():
     speech = EspeakVoice("en").speak(Sentence("…", "en", ()))
     assert [phone.symbol for phone in speech.phones] == [SILENCE]
-    assert speech.duration_s == len(speech.samples) / speech.rate == espeak.EMPTY_S
+    assert speech.duration_s == len(speech.samples) / speech.rate == EMPTY_S
 
 
 def test_rate_pitch_and_variant_change_the_sound():

@@ -68,6 +68,7 @@ def test_only_what_is_missing_damaged_or_asked_for_otherwise_is_rendered(
         network.with_suffix(".json").write_text(damaged)
         assert "1 clips rendered, 2 were" in again()
     assert "3 clips rendered, 0 were" in again("--identity", "erik")
+    assert "3 clips rendered, 0 were" in again("--voice", "hibari")
     assert all(path.read_bytes() != content for path, content in contents.items())
 
 

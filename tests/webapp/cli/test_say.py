@@ -5,6 +5,7 @@ import re
 import subprocess
 import wave
 from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 
 from synth.clip_spec import ClipSpec
 from synth.experiments import CONDITIONS
+from synth.speech.voices import make_voice
 
 SMALL = ("--size", "64x48")
 RATE = 16000
@@ -166,6 +168,31 @@ def test_a_malformed_annotated_file_is_told(
 ) -> None:
     (folder / "a.txt").write_bytes(source if isinstance(source, bytes) else source.encode())
     fails(run("say", "--annotated", "a.txt", "--out", "a.mp4"), *parts)
+
+
+def test_another_voice_speaks(say: Callable[..., dict[str, Any]], run: object, fails: object, folder: Path) -> None:
+    made = say("Hello there!", *SMALL, "--voice", "hibari", "--emotionml", "a.xml")
+    assert made["voice"].startswith("hibari heart (")
+    assert made["digests"]["voice"].startswith("hibari heart ")
+    assert sound_seconds(folder / "a.mp4") == pytest.approx(made["duration_s"], abs=0.04)
+    assert say("--annotated", "a.xml", out="b.mp4") == made
+    plain = say("Hello there!", *SMALL, out="c.mp4")
+    assert plain["voice"].startswith("espeak-ng ")
+    assert plain["phones"] != made["phones"]
+    fails(run("say", "你好", "--voice", "hibari", "--out", "d.mp4"), "'hibari' does not speak 'zh'; what does: espeak")
+
+
+def test_a_voice_that_is_not_installed(
+    run: object, fails: object, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def absent(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    make_voice.cache_clear()
+    monkeypatch.setattr("synth.speech.hibari.installed_version", absent)
+    result = run("say", "Hello", *SMALL, "--voice", "hibari", "--out", "a.mp4")
+    fails(result, "The voice 'hibari' is not installed; install it with `pip install 'padlab[voice]'`.")
+    assert not list(folder.glob("*.mp4"))
 
 
 def test_recorded_speech_takes_the_place_of_the_voice(say: Callable[..., dict[str, Any]], folder: Path) -> None:
