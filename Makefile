@@ -24,6 +24,9 @@ demo: setup ## set up, render and serve the demo study (HOST=, PORT=)
 test: setup ## all tests, on SQLite and PostgreSQL, with a real browser
 	@$(BIN)/python -m pytest
 
+soak: setup ## slower proofs: more of the random tests, and whole studies over HTTP (many minutes)
+	@PADLAB_SOAK=1 $(BIN)/python -m pytest tests/soak tests/webapp/services/test_engine_machine.py -s
+
 lint: setup ## style, types and the direction of imports
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .

@@ -6,8 +6,8 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 
-from evaluation import instruments
 from evaluation.errors import DataError
+from evaluation.instruments import Instrument, Item, TextItem
 from evaluation.study import Cell, StudySpec
 
 RESPONSE_COLUMNS = MappingProxyType(
@@ -18,19 +18,31 @@ RESPONSE_COLUMNS = MappingProxyType(
         "condition": "name of the condition in the study file",
         "instrument": "name of the instrument",
         "item": "id of the item in the instrument",
-        "raw": "the answer as given, a whole number",
+        "raw": "the answer as given on the page, a whole number",
     }
 )
 """Columns of a table of responses, which has one row for each answered item."""
 
+OPTIONAL_COLUMNS = MappingProxyType(
+    {
+        "keyed": "the answer as if no poles had changed sides, which scores are made of; raw if the column is left out",
+        "clip": "place of the clip on the page that the answer is about, counted from 1; 1 if the column is left out",
+    }
+)
+"""Columns that a table of responses may have besides."""
+
 DIMENSIONS = ("P", "A", "D")
 INPUT_COLUMNS = tuple(f"input_{dimension}" for dimension in DIMENSIONS)
 
-_TRIAL = ["participant", "trial"]
+KEY = ("participant", "trial", "clip")
+"""What a row of scores is about: one clip of one trial."""
+
+_KEY = list(KEY)
+_NUMBERS = ("trial", "raw", "keyed", "clip")
 
 
 def check_responses(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
-    """Return the responses with the columns `RESPONSE_COLUMNS` alone, `raw` as whole numbers, sorted by trial.
+    """Return the responses with their columns of `RESPONSE_COLUMNS` and `OPTIONAL_COLUMNS` alone, sorted by trial.
 
     Parameters
     ----------
@@ -42,41 +54,77 @@ def check_responses(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        A new frame; the one given is not changed.
+        A new frame; the one given is not changed. Answers and places are whole numbers.
 
     Raises
     ------
     DataError
         If a column is missing, a name is not in the study, an answer is not one of those offered, an item is answered
-        twice in a trial, or a trial shows two stimuli.
+        twice in a trial, or one clip of a trial is two stimuli.
     """
     missing = [column for column in RESPONSE_COLUMNS if column not in responses.columns]
     if missing:
         raise DataError(f"The responses have no column {', '.join(missing)}; needed are {', '.join(RESPONSE_COLUMNS)}.")
-    table = responses[list(RESPONSE_COLUMNS)].copy()
+    columns = [*RESPONSE_COLUMNS, *(column for column in OPTIONAL_COLUMNS if column in responses.columns)]
+    table = responses[columns].copy()
+    numbers = [column for column in _NUMBERS if column in columns]
     if table.empty:
-        return table.astype({"trial": "int64", "raw": "int64"}).reset_index(drop=True)
-    gaps = [column for column in RESPONSE_COLUMNS if table[column].isna().any()]
+        return table.astype(dict.fromkeys(numbers, "int64")).reset_index(drop=True)
+    gaps = [column for column in columns if table[column].isna().any()]
     if gaps:
         raise DataError(f"The responses have empty cells in {', '.join(gaps)}; a missing answer is a row left out.")
-    table["raw"] = _whole(table["raw"], "raw")
-    table["trial"] = _whole(table["trial"], "trial")
+    for column in numbers:
+        table[column] = _whole(table[column], column)
     _check_cells(spec, table)
-    _check_answers(spec, table)
-    if table.duplicated([*_TRIAL, "instrument", "item"]).any():
-        first = table[table.duplicated([*_TRIAL, "instrument", "item"])].iloc[0]
-        raise DataError(
-            f"The responses hold two answers of participant {first['participant']} to {first['instrument']}."
-            f"{first['item']} in trial {first['trial']}, but only the one that counts may be there."
-        )
-    shown = table.drop_duplicates([*_TRIAL, "stimulus", "condition"])
-    if shown.duplicated(_TRIAL).any():
-        first = shown[shown.duplicated(_TRIAL)].iloc[0]
-        raise DataError(
-            f"Trial {first['trial']} of participant {first['participant']} has two different stimuli or conditions, "
-            "but shows one."
-        )
-    return table.sort_values(_TRIAL, kind="stable", ignore_index=True)
+    _check_answers(spec, complete(table))
+    _check_once(complete(table))
+    return table.sort_values(["participant", "trial"], kind="stable", ignore_index=True)
+
+
+def complete(responses: pd.DataFrame) -> pd.DataFrame:
+    """Return checked responses with all of `OPTIONAL_COLUMNS`, as a new frame."""
+    filled = responses.copy()
+    if "keyed" not in filled:
+        filled["keyed"] = filled["raw"]
+    if "clip" not in filled:
+        filled["clip"] = 1
+    return filled
+
+
+def statistical(instrument: Instrument) -> tuple[Item, ...]:
+    """Return the items of an instrument whose answers are whole numbers about one clip.
+
+    Free texts, choices of several options, and items about each word of a sentence are none: those are exported, but
+    not in tables of responses.
+    """
+    if instrument.per == "word":
+        return ()
+    return tuple(item for item in instrument.items if not isinstance(item, TextItem) and not several(item))
+
+
+def several(item: Item) -> bool:
+    """Tell whether several answers may be chosen."""
+    return bool(getattr(item, "multiple", False))
+
+
+def numbers_of(instrument: Instrument) -> tuple[str, ...]:
+    """Return the columns that an instrument has in a table of scores: its scores, or else its items with numbers.
+
+    An item of an instrument without scores is called ``instrument.item``.
+    """
+    if instrument.scores:
+        return tuple(score.name for score in instrument.scores)
+    return tuple(f"{instrument.name}.{item.id}" for item in instrument.items if item.numeric)
+
+
+def asked_about_clips(spec: StudySpec) -> tuple[Instrument, ...]:
+    """Return the instruments of a study that can have rows in a table of responses, in the order of the page."""
+    return tuple(one for one in map(spec.instrument, spec.instrument_names) if statistical(one))
+
+
+def pad_instruments(spec: StudySpec) -> tuple[str, ...]:
+    """Return the names of a study's instruments from whose answers pleasure, arousal and dominance are scored."""
+    return tuple(one.name for one in asked_about_clips(spec) if set(DIMENSIONS) <= {score.name for score in one.scores})
 
 
 def input_pad(spec: StudySpec, stimulus: str, condition: str) -> tuple[float, float, float] | None:
@@ -104,22 +152,34 @@ def score_trials(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        One row for each trial with an answer: participant, trial, stimulus, condition, the clip's input_P, input_A and
-        input_D, and every score of the study's instruments (P, A and D by Jia et al., 2013, Eq. 13; MOS). NaN where an
-        item that the score needs has no answer, or the clip names no PAD.
+        One row for each clip of each trial with an answer: participant, trial, clip (if the responses have that
+        column), stimulus, condition, the clip's input_P, input_A and input_D, and the numbers (see `numbers_of`) of all
+        instruments of the study, for instance P, A and D by Jia et al. (2013), Eq. 13, and MOS. Scores are made of the
+        keyed answers. NaN where an item that the score needs has no answer, or the clip names no PAD.
     """
-    trials = responses.drop_duplicates(_TRIAL)[[*_TRIAL, "stimulus", "condition"]].reset_index(drop=True)
+    table = complete(responses)
+    trials = table.drop_duplicates(_KEY)[[*_KEY, "stimulus", "condition"]].reset_index(drop=True)
     nothing = (math.nan, math.nan, math.nan)
     pads = {cell: input_pad(spec, *cell) or nothing for cell in spec.cells()}
     given = [pads[Cell(*cell)] for cell in zip(trials["stimulus"], trials["condition"], strict=True)]
     trials[list(INPUT_COLUMNS)] = np.array(given, dtype=float).reshape(-1, len(DIMENSIONS))
-    for name in spec.instruments:
-        instrument = instruments.get(name)
-        answered = responses[responses["instrument"] == name]
-        wide = answered.pivot(index=_TRIAL, columns="item", values="raw")
-        scores = instrument.score_table(wide.reindex(columns=[item.id for item in instrument.items]))
-        trials = trials.join(scores, on=_TRIAL)
-    return trials
+    for instrument in asked_about_clips(spec):
+        numbers = _numbers(instrument, table[table["instrument"] == instrument.name])
+        numbers = numbers.reindex(pd.MultiIndex.from_frame(trials[_KEY]))
+        for name in numbers_of(instrument):
+            own = pd.Series(numbers[name].to_numpy(dtype=float), index=trials.index)
+            # Two parts may each ask an instrument that has this score.
+            trials[name] = trials[name].fillna(own) if name in trials else own
+    return trials if "clip" in responses else trials.drop(columns="clip")
+
+
+def _numbers(instrument: Instrument, answered: pd.DataFrame) -> pd.DataFrame:
+    """Return the numbers of one instrument, one row for each clip of each trial."""
+    items = [item.id for item in instrument.items if item.numeric]
+    wide = answered.pivot(index=_KEY, columns="item", values="keyed").reindex(columns=items)
+    if instrument.scores:
+        return instrument.score_table(wide)
+    return wide.rename(columns={item: f"{instrument.name}.{item}" for item in items})
 
 
 def _whole(values: pd.Series, column: str) -> pd.Series:
@@ -142,10 +202,34 @@ def _check_cells(spec: StudySpec, table: pd.DataFrame) -> None:
 
 def _check_answers(spec: StudySpec, table: pd.DataFrame) -> None:
     offered = {
-        (name, item.id): frozenset(item.values) for name in spec.instruments for item in instruments.get(name).items
+        (instrument.name, item.id): frozenset(item.values)
+        for instrument in asked_about_clips(spec)
+        for item in statistical(instrument)
     }
-    for name, item, raw in table[["instrument", "item", "raw"]].drop_duplicates().itertuples(index=False):
+    for name, item, raw, keyed in (
+        table[["instrument", "item", "raw", "keyed"]].drop_duplicates().itertuples(index=False)
+    ):
         if (name, item) not in offered:
             raise DataError(f"The responses hold {name}.{item}, which the study {spec.slug} does not ask.")
-        if raw not in offered[name, item]:
-            raise DataError(f"The responses hold {raw} for {name}.{item}, which is not one of the answers offered.")
+        for answer in (raw, keyed):
+            if answer not in offered[name, item]:
+                raise DataError(
+                    f"The responses hold {answer} for {name}.{item}, which is not one of the answers offered."
+                )
+
+
+def _check_once(table: pd.DataFrame) -> None:
+    twice = table[table.duplicated([*_KEY, "instrument", "item"])]
+    if len(twice):
+        first = twice.iloc[0]
+        raise DataError(
+            f"The responses hold two answers of participant {first['participant']} to {first['instrument']}."
+            f"{first['item']} in trial {first['trial']}, but only the one that counts may be there."
+        )
+    shown = table.drop_duplicates([*_KEY, "stimulus", "condition"])
+    if shown.duplicated(_KEY).any():
+        first = shown[shown.duplicated(_KEY)].iloc[0]
+        raise DataError(
+            f"Trial {first['trial']} of participant {first['participant']} has two different stimuli or conditions, "
+            "but shows one at each place."
+        )

@@ -1,7 +1,6 @@
 """Simulated raters: they answer the questionnaires as people with known perception and known noise would."""
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,70 +8,40 @@ import numpy.typing as npt
 import pandas as pd
 
 from evaluation.annotation.rounds import SHARE, IntArray, Round, annotate, combine, times_rated
-from evaluation.design.ordering import trial_order
+from evaluation.design.layout import plan_part
+from evaluation.design.plan import PlannedTrial, TrialKind
 from evaluation.errors import DataError
-from evaluation.instruments.base import Item
-from evaluation.instruments.mos import MOS5
-from evaluation.instruments.pad12 import PAD12
-from evaluation.responses import DIMENSIONS, RESPONSE_COLUMNS, input_pad
-from evaluation.seeding import generator
+from evaluation.instruments import Answer
+from evaluation.instruments.display import arrange, keyed
+from evaluation.known_answers import accepted
+from evaluation.responses import DIMENSIONS, OPTIONAL_COLUMNS, RESPONSE_COLUMNS, input_pad, statistical
+from evaluation.seeding import bit_generator, generator
+from evaluation.simulated_answers import PERCEPTION_SD, RATER_SD, answer_instrument, answer_mos5, answer_pad12
 from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import finite_array
-from evaluation.study import StudySpec
+from evaluation.study import Cell, Part, StudySpec
+from evaluation.study_parts import InstrumentUse
 
-RATER_SD: Mapping[str, float] = {"P": 0.20, "A": 0.32, "D": 0.30}
-"""Standard deviation over raters of one face's ratings (Jia et al., 2013, section 2.4)."""
+__all__ = [
+    "PAD_SPREAD",
+    "RATER_SD",
+    "IncrementalAnnotation",
+    "SimulatedTrial",
+    "annotate_incrementally",
+    "annotate_pad",
+    "answer_instrument",
+    "answer_mos5",
+    "answer_pad12",
+    "simulate_responses",
+    "simulate_trials",
+]
 
 PAD_SPREAD: Mapping[str, float] = {"P": 0.485, "A": 0.310, "D": 0.238}
 """Standard deviation over faces of their true PAD that the printed agreement implies; see `annotate_pad`."""
 
-# Noise of a direct rating before it is rounded to five points; `annotate_pad` says where it comes from.
-_PERCEPTION_SD: Mapping[str, float] = {"P": 0.187, "A": 0.316, "D": 0.290}
-
-# How much the four items of a dimension disagree within one rater, in points of the nine-point scale; and how much
-# raters differ in their opinion of one clip, in points of the five-point scale. Neither paper prints them; these are
-# of the usual size.
-_ITEM_SD = 0.6
-_OPINION_SD = 0.8
-
-
-def answer_pad12(pad: Sequence[float], *, rng: np.random.Generator) -> dict[str, int]:
-    """Return one rater's answers to pad12 for a face.
-
-    Parameters
-    ----------
-    pad : sequence of three float
-        Pleasure, arousal and dominance that the face truly shows, each in [-1, 1].
-    rng : numpy.random.Generator
-        Source of the rater's noise.
-
-    Returns
-    -------
-    dict of str to int
-        Answer of each item, -4 to 4. The P, A and D scored from the answers of many raters have mean `pad` and standard
-        deviation `RATER_SD`, except near the ends of the scale, where it cuts the noise off.
-
-    Raises
-    ------
-    DataError
-        If `pad` is not three numbers in [-1, 1].
-
-    References
-    ----------
-    Jia et al. (2013), Eq. 13, turned round, with the noise of section 2.4.
-    """
-    if len(pad) != 3 or not all(-1 <= value <= 1 for value in pad):
-        raise DataError(f"pad is {pad!r}, but must be three numbers from -1 to 1.")
-    items = {item.id: item for item in PAD12.items}
-    # Four items are summed and divided by 16, so their own noise and rounding (1/12) reach the score divided by 64.
-    from_items = (_ITEM_SD**2 + 1 / 12) / 64
-    answers = {}
-    for score, value in zip(PAD12.scores, pad, strict=True):
-        perceived = value + rng.normal(0, math.sqrt(RATER_SD[score.name] ** 2 - from_items))
-        for item, weight in score.weights.items():
-            answers[item] = _nearest(items[item], 4 * weight * perceived + rng.normal(0, _ITEM_SD))
-    return {item: answers[item] for item in items}
+_NEUTRAL = (0.0, 0.0, 0.0)
+_INDIFFERENT = 3.0
 
 
 def annotate_pad(pad: npt.ArrayLike, *, raters: int = 5, rng: np.random.Generator) -> FloatArray:
@@ -117,7 +86,7 @@ def annotate_pad(pad: npt.ArrayLike, *, raters: int = 5, rng: np.random.Generato
         raise DataError("pad must have three columns, P, A and D, with values from -1 to 1.")
     if raters < 1:
         raise DataError(f"raters is {raters}, but must be at least 1.")
-    noise = np.array([_PERCEPTION_SD[dimension] for dimension in DIMENSIONS])
+    noise = np.array([PERCEPTION_SD[dimension] for dimension in DIMENSIONS])
     perceived = true[:, None, :] + noise * rng.standard_normal((len(true), raters, len(DIMENSIONS)))
     # Adding 0.0 turns -0.0 into 0.0.
     ratings: FloatArray = np.clip(np.round(2 * perceived), -2, 2) / 2 + 0.0
@@ -211,33 +180,58 @@ def annotate_incrementally(
     )
 
 
-def answer_mos5(quality: float, *, rng: np.random.Generator) -> dict[str, int]:
-    """Return one rater's answer to mos5.
+@dataclass(frozen=True, kw_only=True)
+class SimulatedTrial:
+    """What a simulated participant answers in one trial.
 
-    Parameters
+    Attributes
     ----------
-    quality : float
-        Mean opinion of the clip, 1 to 5.
-    rng : numpy.random.Generator
-        Source of the rater's noise (SD 0.8 before rounding).
+    participant, trial : int
+        Number of the participant, and place of the trial over all parts, both from 1.
+    part : str
+        Name of the part.
+    kind : str
+        One of `evaluation.design.plan.KINDS`.
+    cells : tuple of Cell
+        What the trial shows.
+    raw, keyed : dict
+        The answers by instrument and item, as they stand on the page and as if no poles had changed sides. Items have
+        the ids of the page, ``P-3`` if there is one for each clip or word.
+    """
 
-    Returns
-    -------
-    dict of str to int
-        The answer, 1 to 5.
+    participant: int
+    trial: int
+    part: str
+    kind: TrialKind
+    cells: tuple[Cell, ...]
+    raw: Mapping[str, Mapping[str, Answer]]
+    keyed: Mapping[str, Mapping[str, Answer]]
+
+
+def simulate_trials(
+    spec: StudySpec, participants: int, *, seed: int, quality: Mapping[str, float] | None = None
+) -> Iterator[SimulatedTrial]:
+    """Yield all trials of simulated participants, also those that do not count; parameters as `simulate_responses`.
 
     Raises
     ------
     DataError
-        If `quality` is not a number from 1 to 5.
-
-    References
-    ----------
-    The scale is that of Jia et al. (2013), section 5.4; the noise is an assumption of this module.
+        If a part is annotated in rounds: what comes in a round depends on the answers of all raters.
+    EvaluationError
+        If words are asked about that the study file does not name.
     """
-    if not 1 <= quality <= 5:
-        raise DataError(f"quality is {quality!r}, but must be a number from 1 to 5.")
-    return {item.id: _nearest(item, quality + rng.normal(0, _OPINION_SD)) for item in MOS5.items}
+    for part in spec.all_parts:
+        if part.annotation is not None:
+            raise DataError(f"Part {part.name} is annotated in rounds, which cannot be simulated beforehand.")
+    names = [condition.name for condition in spec.conditions]
+    true_quality = quality or dict(zip(names, np.linspace(2.5, 4, len(names)).tolist(), strict=True))
+    for index in range(participants):
+        rng = generator(seed, "simulated rater", index)
+        position = 0
+        for part in spec.all_parts:
+            for planned in plan_part(spec, part.name, index):
+                position += 1
+                yield _simulated(spec, part, planned, (index, position), true_quality, rng=rng)
 
 
 def simulate_responses(
@@ -245,13 +239,13 @@ def simulate_responses(
 ) -> pd.DataFrame:
     """Return what a number of simulated participants answer in a study.
 
-    Each participant sees the trials of `evaluation.design.ordering.trial_order`. A face shows its input PAD times the
+    Each participant sees the trials of `evaluation.design.layout.plan_part`. A face shows its input PAD times the
     clip's intensity (1 if the clip has none); a clip without PAD is neutral.
 
     Parameters
     ----------
     spec : StudySpec
-        A study whose instruments are among pad12 and mos5.
+        A study without annotation in rounds.
     participants : int
         How many; the first n of a larger number answer just the same.
     seed : int
@@ -262,44 +256,86 @@ def simulate_responses(
     Returns
     -------
     pandas.DataFrame
-        One row for each item, with the columns `evaluation.responses.RESPONSE_COLUMNS`.
+        One row for each item of the trials that count, with the columns `evaluation.responses.RESPONSE_COLUMNS`, with
+        ``keyed`` if an instrument's poles change sides, and ``clip`` if trials show several clips. Answers about clips
+        together, free texts, choices of several options and answers about words are no part of such a table;
+        `simulate_trials` has them.
 
     Raises
     ------
     DataError
-        If the study uses another instrument.
+        As `simulate_trials`.
 
     References
     ----------
-    As `answer_pad12` and `answer_mos5`.
+    As `answer_instrument`.
     """
-    unknown = set(spec.instruments) - {PAD12.name, MOS5.name}
-    if unknown:
-        raise DataError(f"Simulated raters cannot answer {', '.join(sorted(unknown))}, only pad12 and mos5.")
-    names = [condition.name for condition in spec.conditions]
-    true_quality = quality or dict(zip(names, np.linspace(2.5, 4, len(names)).tolist(), strict=True))
-    rows = []
-    for index in range(participants):
-        rng = generator(seed, "simulated rater", index)
-        for trial, cell in enumerate(trial_order(spec, index), start=1):
-            answers = {
-                PAD12.name: answer_pad12(_shown_pad(spec, *cell), rng=rng),
-                MOS5.name: answer_mos5(true_quality[cell.condition], rng=rng),
-            }
-            rows += [
-                (index + 1, trial, cell.stimulus, cell.condition, name, item, raw)
-                for name in spec.instruments
-                for item, raw in answers[name].items()
-            ]
-    return pd.DataFrame(rows, columns=list(RESPONSE_COLUMNS))
+    rows = [
+        row
+        for trial in simulate_trials(spec, participants, seed=seed, quality=quality)
+        if trial.kind == "rating"
+        for row in _rows(spec, trial)
+    ]
+    frame = pd.DataFrame(rows, columns=[*RESPONSE_COLUMNS, *OPTIONAL_COLUMNS])
+    needed = {
+        "keyed": any(use.flip for part in spec.all_parts for use in part.instruments),
+        "clip": any(part.presentation.together != "single" for part in spec.all_parts),
+    }
+    return frame.drop(columns=[column for column, is_needed in needed.items() if not is_needed])
+
+
+def _simulated(
+    spec: StudySpec,
+    part: Part,
+    planned: PlannedTrial,
+    place: tuple[int, int],
+    quality: Mapping[str, float],
+    *,
+    rng: np.random.Generator,
+) -> SimulatedTrial:
+    index, position = place
+    pads = [_shown_pad(spec, *cell) for cell in planned.cells] or [_NEUTRAL]
+    qualities = [quality[cell.condition] for cell in planned.cells] or [_INDIFFERENT]
+    words = spec.stimulus(planned.cells[0].stimulus).words if planned.cells else ()
+    told = accepted(part, planned.kind, planned.check) if planned.kind == "instructed" else {}
+    uses = {use.use: use for use in part.instruments}
+    raw, true = {}, {}
+    for name in planned.instruments:
+        use = uses.get(name, InstrumentUse(use=name))
+        instrument = spec.instrument(name).expanded(clips=max(1, len(planned.cells)), words=words)
+        answers = answer_instrument(instrument, pads, qualities, rng=rng)
+        for item in answers:
+            answers[item] = next(iter(told.get(f"{name}.{item}", ())), answers[item])
+        # The page of this very trial, as it is laid out for real participants.
+        bits = bit_generator(spec.seed, spec.slug, "display", name, index, position)
+        display = arrange(instrument, shuffle=use.shuffle, flip=use.flip, bits=bits)
+        raw[name], true[name] = keyed(instrument, display, answers), answers
+    return SimulatedTrial(
+        participant=index + 1,
+        trial=position,
+        part=part.name,
+        kind=planned.kind,
+        cells=planned.cells,
+        raw=raw,
+        keyed=true,
+    )
+
+
+def _rows(spec: StudySpec, trial: SimulatedTrial) -> Iterator[tuple[object, ...]]:
+    for name, answers in trial.raw.items():
+        instrument = spec.instrument(name)
+        if instrument.per == "trial" and len(trial.cells) > 1:
+            continue
+        for clip, cell in enumerate(trial.cells, start=1):
+            for item in statistical(instrument):
+                on_page = item.id if instrument.per == "trial" else f"{item.id}-{clip}"
+                if on_page in answers:
+                    about = (trial.participant, trial.trial, cell.stimulus, cell.condition, name, item.id)
+                    yield (*about, answers[on_page], trial.keyed[name][on_page], clip)
 
 
 def _shown_pad(spec: StudySpec, stimulus: str, condition: str) -> tuple[float, ...]:
     intensity = spec.clip_fields(stimulus, condition).get("intensity", 1.0)
     factor = float(intensity) if isinstance(intensity, (int, float)) else 1.0
-    pad = input_pad(spec, stimulus, condition) or (0.0, 0.0, 0.0)
+    pad = input_pad(spec, stimulus, condition) or _NEUTRAL
     return tuple(min(1.0, max(-1.0, value * factor)) for value in pad)
-
-
-def _nearest(item: Item, value: float) -> int:
-    return int(min(max(round(value), min(item.values)), max(item.values)))

@@ -2,113 +2,65 @@
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
-from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Self
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    JsonValue,
-    StringConstraints,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
-from pydantic_core import InitErrorDetails, PydanticCustomError
+from pydantic import Field, JsonValue, ValidationError, model_validator
 
 from evaluation import instruments, located_yaml
 from evaluation.errors import EvaluationError, Problem, StudyFileError
+from evaluation.instruments import Instrument
+from evaluation.instruments.definition import InstrumentDefinition
+from evaluation.study_checks import inconsistencies
+from evaluation.study_parts import (
+    Cell,
+    CellChoice,
+    Collect,
+    Completion,
+    Condition,
+    InstrumentUse,
+    Language,
+    Paragraphs,
+    Part,
+    Piece,
+    Presentation,
+    Screening,
+    Sharing,
+    Slug,
+    Stimulus,
+    Texts,
+    VideoSettings,
+)
 from evaluation.study_problems import problems_of
 
+__all__ = [
+    "SCHEMA_ID",
+    "Cell",
+    "CellChoice",
+    "Condition",
+    "InstrumentUse",
+    "Part",
+    "Presentation",
+    "Stimulus",
+    "StudySpec",
+    "VideoSettings",
+    "bundled_names",
+    "bundled_text",
+    "load_bundled",
+    "read_text",
+]
+
 SCHEMA_ID = "https://json-schema.org/draft/2020-12/schema"
-
-Slug = Annotated[
-    str,
-    StringConstraints(pattern=r"^[a-z0-9](?:[a-z0-9-]{0,62}[a-z0-9])?$"),
-    Field(description="1 to 64 lower-case letters, digits and hyphens, beginning and ending with a letter or digit"),
-]
-Name = Annotated[
-    str,
-    StringConstraints(pattern=r"^[a-z0-9][a-z0-9_-]{0,63}$"),
-    Field(description="1 to 64 lower-case letters, digits, - and _, beginning with a letter or digit"),
-]
-Language = Annotated[str, StringConstraints(pattern=r"^[a-z]{2,3}(?:-[A-Za-z0-9]{2,8})*$")]
-Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
-Texts = Annotated[Mapping[Language, Line], Field(description="one text for each language of the study")]
-Paragraphs = Annotated[
-    Mapping[Language, Annotated[tuple[Line, ...], Field(min_length=1)]],
-    Field(description="a list of short paragraphs for each language of the study"),
-]
-ClipFields = Annotated[
-    Mapping[str, JsonValue], Field(description="fields of the clip, such as pad, intensity, text or model")
-]
+MAIN = "main"
+"""Name of the one part of a study whose file names no parts."""
 
 
-class Cell(NamedTuple):
-    """One stimulus in one condition: what a trial shows."""
-
-    stimulus: str
-    condition: str
-
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class VideoSettings(_Part):
-    """Frame size in pixels and frames per second of every clip of the study."""
-
-    width: int = Field(default=720, ge=16, le=3840, multiple_of=2, description="an even whole number from 16 to 3840")
-    height: int = Field(default=576, ge=16, le=2160, multiple_of=2, description="an even whole number from 16 to 2160")
-    fps: int = Field(default=25, ge=10, le=120, description="a whole number from 10 to 120")
-
-
-class Condition(_Part):
-    """What is varied: the papers' "group"."""
-
-    name: Name
-    label: Texts
-    description: str = Field(default="", description="for the experimenter; participants never see it")
-    clip: ClipFields = Field(default_factory=dict)
-
-
-class Stimulus(_Part):
-    """What is shown, before a condition changes it."""
-
-    id: Name
-    label: Texts
-    clip: ClipFields = Field(default_factory=dict)
-
-
-class CellChoice(_Part):
-    """One stimulus in one condition, as written in a study file."""
-
-    stimulus: str
-    condition: str
-
-
-class Presentation(_Part):
-    """Which participant sees what.
-
-    ``full``: everything. ``latin_square``: each stimulus once, the conditions rotated over the participants, so that
-    each stimulus is seen equally often in each of its conditions. ``cells`` lists the stimuli and conditions that go
-    together; left out, every stimulus is made in every condition.
-    """
-
-    assignment: Literal["latin_square", "full"]
-    cells: tuple[CellChoice, ...] | None = Field(
-        default=None, min_length=1, description="pairs of stimulus and condition; left out, all of them"
-    )
-
-
-class StudySpec(_Part):
+class StudySpec(Piece):
     """A study, complete and consistent.
 
-    Read one with `from_yaml`, `read` or `load_bundled`. Equal studies have equal `digest`.
+    Read one with `from_yaml`, `read` or `load_bundled`. Equal studies have equal `digest`. A study of one part may
+    write that part's instruments and presentation at the top, without ``parts``; `all_parts` returns them alike.
     """
 
     slug: Slug
@@ -122,32 +74,28 @@ class StudySpec(_Part):
     video: VideoSettings = VideoSettings()
     conditions: Annotated[tuple[Condition, ...], Field(min_length=1, description="at least one condition")]
     stimuli: Annotated[tuple[Stimulus, ...], Field(min_length=1, description="at least one stimulus")]
-    instruments: Annotated[
-        tuple[str, ...],
-        Field(
-            min_length=1,
-            description="names of instruments, in the order of the page",
-            json_schema_extra={"items": {"type": "string", "enum": list(instruments.names())}},
-        ),
-    ]
-    presentation: Presentation
-
-    @field_validator("instruments")
-    @classmethod
-    def _known(cls, names: tuple[str, ...]) -> tuple[str, ...]:
-        _raise(
-            cls.__name__,
-            [
-                _issue((position,), f"there is no instrument {name!r}; there are {', '.join(instruments.names())}.")
-                for position, name in enumerate(names)
-                if name not in instruments.names()
-            ],
-        )
-        return names
+    own_instruments: tuple[InstrumentDefinition, ...] = ()
+    instruments: tuple[InstrumentUse, ...] | None = Field(
+        default=None, min_length=1, description="names of instruments, in the order of the page"
+    )
+    presentation: Presentation | None = None
+    parts: tuple[Part, ...] | None = Field(
+        default=None, min_length=1, description="at least one part, each with its instruments and presentation"
+    )
+    quota: int | None = Field(default=None, ge=1, description="how many participants are wanted; left out, any number")
+    lapse_hours: float = Field(
+        default=24.0, gt=0, description="hours without a sign of a participant after which their place is given back"
+    )
+    completion: Completion = Completion()
+    collect: Collect = Collect()
+    share: Sharing = Sharing()
+    screening: Screening = Screening()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        _raise(type(self).__name__, [*self._repeated(), *self._untranslated(), *self._wrong_cells()])
+        found = list(inconsistencies(self))
+        if found:
+            raise ValidationError.from_exception_data(type(self).__name__, found)
         return self
 
     @classmethod
@@ -192,9 +140,13 @@ class StudySpec(_Part):
     @classmethod
     def json_schema(cls) -> dict[str, Any]:
         """Return the JSON Schema (2020-12) of study files, with which editors check and complete them."""
-        return {"$schema": SCHEMA_ID, **cls.model_json_schema()}
+        schema = cls.model_json_schema()
+        whole = schema["$defs"]["InstrumentUse"]
+        # Bundled names first, so that editors offer them; a study may have instruments of its own besides.
+        schema["$defs"]["InstrumentUse"] = {"anyOf": [{"enum": list(instruments.names())}, {"type": "string"}, whole]}
+        return {"$schema": SCHEMA_ID, **schema}
 
-    @cached_property
+    @property
     def digest(self) -> str:
         """Return the sha-256 of the study's content, in hexadecimal; comments and layout of the file do not count."""
         # Without defaults, so that a field added by a later version does not change the studies that do not use it.
@@ -202,14 +154,53 @@ class StudySpec(_Part):
         canonical = json.dumps(content, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
         return hashlib.sha256(canonical.encode()).hexdigest()
 
-    def cells(self) -> tuple[Cell, ...]:
-        """Return every stimulus in every condition it is made in, in the order of the file's stimuli."""
-        if self.presentation.cells is None:
-            return tuple(
-                Cell(stimulus.id, condition.name) for stimulus in self.stimuli for condition in self.conditions
-            )
-        chosen = {Cell(cell.stimulus, cell.condition) for cell in self.presentation.cells}
-        every = (Cell(stimulus.id, condition.name) for stimulus in self.stimuli for condition in self.conditions)
+    @property
+    def all_parts(self) -> tuple[Part, ...]:
+        """Return the parts in their order; of a study without ``parts`` the one that it is."""
+        if self.parts is not None:
+            return self.parts
+        return (Part(name=MAIN, instruments=self.instruments, presentation=self.presentation),)  # type: ignore[arg-type]
+
+    def part(self, name: str) -> Part:
+        """Return the part of this name; EvaluationError if there is none."""
+        for part in self.all_parts:
+            if part.name == name:
+                return part
+        raise EvaluationError(f"Study {self.slug}: there is no part {name!r}.")
+
+    def only(self, name: str) -> Self:
+        """Return the study as if the part of this name were all of it, for what looks at one part alone."""
+        return self.model_copy(update={"parts": (self.part(name),), "instruments": None, "presentation": None})
+
+    @property
+    def instrument_names(self) -> tuple[str, ...]:
+        """Return the names of the instruments that trials ask, each once, in the order of parts and pages."""
+        return tuple(dict.fromkeys(use.use for part in self.all_parts for use in part.instruments))
+
+    def instrument(self, name: str) -> Instrument:
+        """Return the instrument of this name, the study's own or a bundled one; EvaluationError if there is none."""
+        for definition in self.own_instruments:
+            if definition.name == name:
+                return definition.build()
+        return instruments.get(name)
+
+    def cells(self, part: str | None = None) -> tuple[Cell, ...]:
+        """Return every stimulus in every condition it is made in, in the order of the file's stimuli.
+
+        Parameters
+        ----------
+        part : str, optional
+            Only those of this part; left out, those of all parts.
+        """
+        parts = self.all_parts if part is None else (self.part(part),)
+        every = [Cell(stimulus.id, condition.name) for stimulus in self.stimuli for condition in self.conditions]
+        chosen: set[Cell] = set()
+        for one in parts:
+            listed = one.presentation.cells
+            chosen |= set(every) if listed is None else {Cell(cell.stimulus, cell.condition) for cell in listed}
+            if part is None:
+                chosen |= {Cell(shown.stimulus, shown.condition) for shown in one.training}
+                chosen |= {Cell(shown.stimulus, shown.condition) for shown in one.gold}
         return tuple(cell for cell in every if cell in chosen)
 
     def stimulus(self, stimulus_id: str) -> Stimulus:
@@ -249,66 +240,6 @@ class StudySpec(_Part):
             **self.stimulus(stimulus_id).clip,
             **self.condition(condition).clip,
         }
-
-    def _repeated(self) -> Iterator[InitErrorDetails]:
-        lists: dict[str, list[str]] = {
-            "languages": list(self.languages),
-            "conditions": [condition.name for condition in self.conditions],
-            "stimuli": [stimulus.id for stimulus in self.stimuli],
-            "instruments": list(self.instruments),
-        }
-        names_inside = {"conditions": ("name",), "stimuli": ("id",)}
-        for field, values in lists.items():
-            for position, value in enumerate(values):
-                if value in values[:position]:
-                    place = (field, position, *names_inside.get(field, ()))
-                    yield _issue(place, f"{value!r} is here for the second time, but must be unique.")
-
-    def _untranslated(self) -> Iterator[InitErrorDetails]:
-        texts: list[tuple[tuple[str | int, ...], Mapping[str, object]]] = [
-            (("title",), self.title),
-            (("welcome",), self.welcome),
-            (("consent",), self.consent),
-            (("instructions",), self.instructions),
-            (("debrief",), self.debrief),
-            *((("conditions", n, "label"), condition.label) for n, condition in enumerate(self.conditions)),
-            *((("stimuli", n, "label"), stimulus.label) for n, stimulus in enumerate(self.stimuli)),
-        ]
-        listed = ", ".join(self.languages)
-        for place, text in texts:
-            for language in self.languages:
-                if language not in text:
-                    yield _issue(place, f"the text in {language} is missing; the study's languages are {listed}.")
-            for language in text:
-                if language not in self.languages:
-                    yield _issue((*place, language), f"{language} is not one of the study's languages ({listed}).")
-        for position, name in enumerate(self.instruments):
-            known = instruments.get(name).languages
-            for language in self.languages:
-                if language not in known:
-                    message = f"the instrument {name} has no text in {language}; it has {', '.join(known)}."
-                    yield _issue(("instruments", position), message)
-
-    def _wrong_cells(self) -> Iterator[InitErrorDetails]:
-        chosen = self.presentation.cells
-        if chosen is None:
-            return
-        known = {
-            "stimulus": [stimulus.id for stimulus in self.stimuli],
-            "condition": [condition.name for condition in self.conditions],
-        }
-        for kind, names in known.items():
-            used = [getattr(cell, kind) for cell in chosen]
-            for position, name in enumerate(used):
-                if name not in names:
-                    message = f"there is no {kind} {name!r}; there are {', '.join(names)}."
-                    yield _issue(("presentation", "cells", position, kind), message)
-            for name in names:
-                if name not in used:
-                    yield _issue(("presentation", "cells"), f"the {kind} {name!r} is in no cell, so it is never shown.")
-        for position, cell in enumerate(chosen):
-            if cell in chosen[:position]:
-                yield _issue(("presentation", "cells", position), "this cell is here for the second time.")
 
 
 def read_text(path: Path) -> str:
@@ -353,13 +284,3 @@ def bundled_text(name: str) -> str:
 def load_bundled(name: str) -> StudySpec:
     """Return a bundled study, for instance ``load_bundled("demo")``; raises as `bundled_text`."""
     return StudySpec.from_yaml(bundled_text(name), source=f"{name}.yaml")
-
-
-def _issue(place: tuple[str | int, ...], message: str) -> InitErrorDetails:
-    # The message is passed as a value, since pydantic would take braces in it for fields of a template.
-    return InitErrorDetails(type=PydanticCustomError("study", "{text}", {"text": message}), loc=place, input=None)
-
-
-def _raise(title: str, issues: list[InitErrorDetails]) -> None:
-    if issues:
-        raise ValidationError.from_exception_data(title, issues)

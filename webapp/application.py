@@ -18,13 +18,22 @@ from webapp.media import MediaStore
 from webapp.parts import Parts
 from webapp.resources import resource_dir
 
+YEAR_SECONDS = 365 * 24 * 3600
 MAX_FORM_BYTES = 1024 * 1024
+
+
+class Site(Flask):
+    """The application; its static files have addresses with a digest, so browsers may keep them for good."""
+
+    def get_send_file_max_age(self, filename: str | None) -> int | None:
+        """Return for how many seconds a browser may keep a static file."""
+        return YEAR_SECONDS if filename is not None and "v" in request.args else super().get_send_file_max_age(filename)
 
 
 def build(settings: Settings | None = None) -> Flask:
     """Build the application; see `webapp.create_app`."""
     settings = settings or Settings.from_env()
-    app = Flask("webapp", static_folder=str(resource_dir("static")))
+    app = Site("webapp", static_folder=str(resource_dir("static")))
     app.config.update(
         SECRET_KEY=settings.secret_key,
         MAX_CONTENT_LENGTH=MAX_FORM_BYTES,

@@ -69,18 +69,43 @@ class Database:
 
     def upgrade(self) -> str:
         """Bring the schema to the newest revision and return that revision."""
-        with _one_sentence(self.url):
-            config = _alembic_config()
-            with self._writing.begin() as connection:
-                if connection.dialect.name == "postgresql":
-                    # Two that start at once must not both make the tables; the lock ends with the transaction.
-                    connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": UPGRADE_LOCK})
-                config.attributes["connection"] = connection
-                try:
-                    command.upgrade(config, "head")
-                except CommandError as error:
-                    raise self._newer(str(error)) from error
+        with _one_sentence(self.url), self._migration() as config:
+            try:
+                command.upgrade(config, "head")
+            except CommandError as error:
+                raise self._newer(str(error)) from error
         return self.head()
+
+    def downgrade(self, revision: str) -> None:
+        """Bring the schema back to an earlier revision; what that has no room for is lost."""
+        with _one_sentence(self.url), self._migration() as config:
+            command.downgrade(config, revision)
+
+    @contextmanager
+    def _migration(self) -> Iterator[Config]:
+        """Hand a connection to Alembic, in one transaction that ends with every reference whole."""
+        config = _alembic_config()
+        with self._writing.connect() as connection:
+            sqlite = connection.dialect.name == "sqlite"
+            if sqlite:
+                # SQLite changes a table by making it anew; the old one's end must not count as that of its rows. The
+                # switch has no effect inside a transaction, so it comes before the first one.
+                connection.connection.cursor().execute("PRAGMA foreign_keys=OFF")
+            try:
+                with connection.begin():
+                    if not sqlite:
+                        # Two that start at once must not both make the tables; the lock ends with the transaction.
+                        connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": UPGRADE_LOCK})
+                    config.attributes["connection"] = connection
+                    yield config
+                    if sqlite and connection.exec_driver_sql("PRAGMA foreign_key_check").first() is not None:
+                        raise DatabaseError(
+                            f"The database {_shown(self.url)} has rows that refer to nothing, and stays as it was; "
+                            "restore it from a backup"
+                        )
+            finally:
+                if sqlite:
+                    connection.connection.cursor().execute("PRAGMA foreign_keys=ON")
 
     def _newer(self, reason: str) -> DatabaseError:
         return DatabaseError(

@@ -36,10 +36,11 @@ CONNECT_SECONDS = 15
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a job: the clip's size in bytes, or one sentence that says what went wrong."""
+    """What became of a job: the clip's size in bytes and its length, or one sentence that says what went wrong."""
 
     digest: str
     size: int = 0
+    duration_s: float | None = None
     error: str | None = None
 
 
@@ -49,6 +50,8 @@ def render_job(job: Job, media_url: str, face_dir: str, models_dir: str) -> Outc
     folder, models = Path(face_dir), Path(models_dir)
 
     def make(path: Path) -> dict[str, Any]:
+        if "file" in job.spec:
+            raise SynthError(f"The file {job.spec['file']} is gone from the media store; apply its study file again")
         assets.fetch(folder)
         spec = ClipSpec.from_dict(job.spec)
         if clip_digest(spec, folder, models) != job.digest:
@@ -61,9 +64,13 @@ def render_job(job: Job, media_url: str, face_dir: str, models_dir: str) -> Outc
 
     try:
         store.add(job.digest, make)
-        return Outcome(job.digest, size=store.size(job.digest))
+        return _stored(store, job.digest)
     except (SynthError, OSError) as error:
         return Outcome(job.digest, error=str(error))
+
+
+def _stored(store: MediaStore, digest: str) -> Outcome:
+    return Outcome(digest, size=store.size(digest), duration_s=store.lineage(digest).get("duration_s"))
 
 
 class Farm:
@@ -156,7 +163,7 @@ def requeue_lost(database: Database, settings: Settings) -> int:
     store = MediaStore(settings.media_url)
     with database.read() as session:
         recorded = clips.done(session)
-    lost = [digest for digest in recorded if not store.has(digest)]
+    lost = [digest for digest, suffix in recorded if not store.has(digest, suffix)]
     if lost:
         with database.write() as session:
             clips.requeue(session, lost)
@@ -210,7 +217,7 @@ def render_unfinished(
             open_digests.discard(outcome.digest)
             with database.write() as session:
                 if outcome.error is None:
-                    clips.mark_done(session, outcome.digest, outcome.size)
+                    clips.mark_done(session, outcome.digest, outcome.size, outcome.duration_s)
                 else:
                     clips.mark_failed(session, outcome.digest, outcome.error)
                 clips.renew(session, open_digests)
@@ -233,7 +240,7 @@ def _outcomes(
     missing = []
     for job in jobs:
         if store.has(job.digest):
-            yield Outcome(job.digest, size=store.size(job.digest))
+            yield _stored(store, job.digest)
         else:
             missing.append(job)
     if not missing:

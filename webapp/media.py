@@ -1,5 +1,6 @@
-"""The media store: rendered clips by digest, in a folder or at any fsspec URL."""
+"""The media store: rendered clips and files of one's own, by digest, in a folder or at any fsspec URL."""
 
+import hashlib
 import json
 import re
 import shutil
@@ -13,11 +14,15 @@ import fsspec
 
 from webapp.errors import ConfigError
 
+CLIP = "mp4"
+"""Suffix of rendered clips."""
+
 _DIGEST = re.compile(r"[0-9a-f]{64}")
+_SUFFIX = re.compile(r"[a-z0-9]{1,5}")
 
 
 class MediaStore:
-    """A content-addressed store of clips (MP4) and their lineage (JSON).
+    """A content-addressed store of clips (MP4), other media files, and the lineage of each (JSON).
 
     Parameters
     ----------
@@ -41,19 +46,19 @@ class MediaStore:
             ) from error
         self._local = "file" in (self._fs.protocol if isinstance(self._fs.protocol, tuple) else (self._fs.protocol,))
 
-    def has(self, digest: str) -> bool:
+    def has(self, digest: str, suffix: str = CLIP) -> bool:
         """Tell whether the clip is there, whole: the lineage is written last."""
-        return bool(self._fs.exists(self._path(digest, "json")) and self._fs.exists(self._path(digest, "mp4")))
+        return bool(self._fs.exists(self._path(digest, "json")) and self._fs.exists(self._path(digest, suffix)))
 
-    def size(self, digest: str) -> int:
+    def size(self, digest: str, suffix: str = CLIP) -> int:
         """Return the size of the clip in bytes."""
-        return int(self._fs.size(self._path(digest, "mp4")))
+        return int(self._fs.size(self._path(digest, suffix)))
 
-    def local_path(self, digest: str) -> Path | None:
+    def local_path(self, digest: str, suffix: str = CLIP) -> Path | None:
         """Return the clip's file when the store is a folder of this machine, otherwise None."""
-        return Path(self._path(digest, "mp4")) if self._local else None
+        return Path(self._path(digest, suffix)) if self._local else None
 
-    def read(self, digest: str) -> bytes:
+    def read(self, digest: str, suffix: str = CLIP) -> bytes:
         """Return the clip.
 
         Raises
@@ -61,7 +66,7 @@ class MediaStore:
         FileNotFoundError
             If the store does not hold it.
         """
-        return bytes(self._fs.cat_file(self._path(digest, "mp4")))
+        return bytes(self._fs.cat_file(self._path(digest, suffix)))
 
     def lineage(self, digest: str) -> dict[str, Any]:
         """Return how the clip was made (the sidecar).
@@ -74,7 +79,7 @@ class MediaStore:
         sidecar: dict[str, Any] = json.loads(self._fs.cat_file(self._path(digest, "json")))
         return sidecar
 
-    def add(self, digest: str, make: Callable[[Path], dict[str, Any]]) -> bool:
+    def add(self, digest: str, make: Callable[[Path], dict[str, Any]], suffix: str = CLIP) -> bool:
         """Make a clip unless it is there already.
 
         Parameters
@@ -82,25 +87,45 @@ class MediaStore:
         digest : str
             The clip's identity, 64 hexadecimal digits.
         make : callable
-            Writes the MP4 to the path it is given and returns the lineage.
+            Writes the file to the path it is given and returns the lineage.
+        suffix : str
+            Kind of the file.
 
         Returns
         -------
         bool
             Whether the clip had to be made.
         """
-        if self.has(digest):
+        if self.has(digest, suffix):
             return False
         with tempfile.TemporaryDirectory(prefix="padlab-") as folder:
-            draft = Path(folder) / "clip.mp4"
+            draft = Path(folder) / f"clip.{suffix}"
             sidecar = make(draft)
-            self._put(draft, self._path(digest, "mp4"))
+            self._put(draft, self._path(digest, suffix))
             draft.with_suffix(".json").write_text(json.dumps(sidecar, ensure_ascii=False, indent=1), encoding="utf-8")
             self._put(draft.with_suffix(".json"), self._path(digest, "json"))
         return True
 
+    def add_file(self, source: Path) -> str:
+        """Put a file of one's own into the store and return its digest, that of its bytes.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be read.
+        """
+        with source.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256").hexdigest()
+
+        def copy(path: Path) -> dict[str, Any]:
+            shutil.copyfile(source, path)
+            return {"digest": digest, "file": source.name, "bytes": path.stat().st_size}
+
+        self.add(digest, copy, source.suffix.lower().removeprefix("."))
+        return digest
+
     def _path(self, digest: str, suffix: str) -> str:
-        if not _DIGEST.fullmatch(digest):
+        if not _DIGEST.fullmatch(digest) or not _SUFFIX.fullmatch(suffix):
             raise FileNotFoundError(digest)
         return f"{self._root}/{digest[:2]}/{digest}.{suffix}"
 

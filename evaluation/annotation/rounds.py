@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from evaluation.annotation.missing import array_with_gaps, known_deviation
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics.agreement import deviation
 from evaluation.statistics.arrays import FloatArray, finite_vector
@@ -52,7 +53,7 @@ class Round:
     new : int
         How many of them are rated for the first time.
     ratings : numpy.ndarray, shape (m, raters, dimensions)
-        Their ratings.
+        Their ratings; NaN where one is missing.
     """
 
     samples: IntArray
@@ -97,32 +98,36 @@ def divide(n: int, sets: int, *, rng: np.random.Generator) -> tuple[IntArray, ..
     return tuple(np.array_split(rng.permutation(n).astype(np.intp), sets))
 
 
-def disagreement(ratings: npt.ArrayLike, *, rule: str = "mean") -> FloatArray:
+def disagreement(ratings: npt.ArrayLike, *, rule: str = "mean", missing: bool = False) -> FloatArray:
     """Return how much raters disagree about each sample, as one number over all dimensions.
 
     Parameters
     ----------
     ratings : array_like, shape (samples, raters, dimensions)
-        Complete ratings.
+        Ratings, complete unless `missing`.
     rule : str
         How the standard deviations over raters of a sample's dimensions are combined: "mean" (the default; the paper
         does not say, and each dimension counts alike), "largest", or "root_mean_square".
+    missing : bool
+        True: ratings may be missing (NaN), and the standard deviations are over those that are there.
 
     Returns
     -------
     numpy.ndarray, shape (samples,)
-        Disagreement, in the units of the ratings.
+        Disagreement, in the units of the ratings; with `missing`, NaN for a sample that has fewer than two ratings on a
+        dimension.
 
     Raises
     ------
     DataError
-        If the ratings are no complete stack of finite numbers or there is no such rule.
+        If the ratings are no stack of finite numbers, which must be complete unless `missing`, or there is no such
+        rule.
     InsufficientDataError
-        If there are fewer than two raters.
+        If there are fewer than two raters, unless `missing`.
     """
     if rule not in _RULES:
         raise DataError(f"There is no rule {rule!r}; there are {', '.join(RULES)}.")
-    return _RULES[rule](deviation(ratings))
+    return _RULES[rule](known_deviation(ratings) if missing else deviation(ratings))
 
 
 def number_of(n: int, share: float) -> int:
@@ -157,8 +162,13 @@ def most_disputed(disagreements: npt.ArrayLike, share: float = SHARE) -> IntArra
         If a number is missing or infinite, or the share is not from 0 to 1.
     """
     values = finite_vector(disagreements, name="disagreements")
-    places: IntArray = np.argsort(-values, kind="stable")[: number_of(values.size, share)]
-    return places
+    number = number_of(values.size, share)
+    if not number:
+        return np.array([], dtype=np.intp)
+    # Only what can be among them is sorted; in a stable sort the earlier of equals comes first.
+    least = np.partition(values, values.size - number)[values.size - number]
+    candidates: IntArray = np.flatnonzero(values >= least)
+    return candidates[np.argsort(-values[candidates], kind="stable")][:number]
 
 
 def annotate(
@@ -219,26 +229,28 @@ def annotate(
 
 
 def combine(rounds: Sequence[Round], n: int) -> FloatArray:
-    """Return each rater's rating of each sample: the mean over the rounds in which it was rated.
+    """Return each rater's rating of each sample: the mean over the rounds in which that rater rated it.
+
+    For a fixed panel; where raters differ between rounds, see `combine_fresh`.
 
     Parameters
     ----------
     rounds : sequence of Round
-        All rounds, with the same raters and dimensions.
+        All rounds, with the same raters and dimensions; ratings may be missing (NaN).
     n : int
         Number of samples.
 
     Returns
     -------
     numpy.ndarray, shape (n, raters, dimensions)
-        Mean ratings.
+        Mean ratings; NaN where a rater never rated a sample.
 
     Raises
     ------
     DataError
         If the rounds differ in raters or dimensions, or a round names a sample twice or one that there is not.
     InsufficientDataError
-        If there are no rounds or a sample was never rated.
+        If there are no rounds or a sample was never rated, by anybody, on a dimension.
 
     References
     ----------
@@ -246,27 +258,68 @@ def combine(rounds: Sequence[Round], n: int) -> FloatArray:
     """
     if not rounds:
         raise InsufficientDataError("There are no rounds to combine.")
-    shape = rounds[0].ratings.shape[1:]
-    sums = np.zeros((n, *shape))
-    for number, found in enumerate(rounds, start=1):
-        if found.ratings.shape != (found.samples.size, *shape):
+    return _mean_over_rounds(rounds, [found.ratings for found in rounds], n)
+
+
+def combine_fresh(rounds: Sequence[Round], n: int) -> FloatArray:
+    """Return the rating of each sample by panels that differ from round to round.
+
+    It is the mean over the rounds of each round's mean over its raters, so that each round counts alike however many
+    raters it had. A rater of one round is nobody in another, so that there are no means of single raters.
+
+    Parameters
+    ----------
+    rounds : sequence of Round
+        All rounds, with the same dimensions and any numbers of raters; ratings may be missing (NaN).
+    n : int
+        Number of samples.
+
+    Returns
+    -------
+    numpy.ndarray, shape (n, dimensions)
+        Mean ratings.
+
+    Raises
+    ------
+    DataError
+        If the rounds differ in dimensions, or a round names a sample twice or one that there is not.
+    InsufficientDataError
+        If there are no rounds or a sample was never rated, by anybody, on a dimension.
+    """
+    if not rounds:
+        raise InsufficientDataError("There are no rounds to combine.")
+    means = []
+    for found in rounds:
+        stack = array_with_gaps(found.ratings)
+        known = ~np.isnan(stack)
+        number = known.sum(axis=1, keepdims=True)
+        sums = np.where(known, stack, 0).sum(axis=1, keepdims=True)
+        means.append(np.where(number > 0, sums / np.maximum(number, 1), np.nan))
+    return _mean_over_rounds(rounds, means, n)[:, 0]
+
+
+def _mean_over_rounds(rounds: Sequence[Round], ratings: Sequence[FloatArray], n: int) -> FloatArray:
+    shape = ratings[0].shape[1:]
+    sums, times = np.zeros((n, *shape)), np.zeros((n, *shape))
+    for number, (found, rated) in enumerate(zip(rounds, ratings, strict=True), start=1):
+        if rated.shape != (found.samples.size, *shape):
             raise DataError(
-                f"Round {number} has ratings of the shape {found.ratings.shape}, "
-                f"but {(found.samples.size, *shape)} is needed."
+                f"Round {number} has ratings of the shape {rated.shape}, but {(found.samples.size, *shape)} is needed."
             )
         _check_samples(found.samples, n, number)
-        sums[found.samples] += found.ratings
-    times = times_rated(rounds, n)
-    if (times == 0).any():
+        known = ~np.isnan(rated)
+        sums[found.samples] += np.where(known, rated, 0)
+        times[found.samples] += known
+    never = (times.sum(axis=1) == 0).any(axis=1)
+    if never.any():
         raise InsufficientDataError(
-            f"{int((times == 0).sum())} of {n} samples were never rated, the first of them sample "
-            f"{int(times.argmin())}."
+            f"{int(never.sum())} of {n} samples were never rated, the first of them sample {int(never.argmax())}."
         )
-    return sums / times[:, None, None]
+    return np.where(times > 0, sums / np.maximum(times, 1), np.nan)
 
 
 def times_rated(rounds: Sequence[Round], n: int) -> IntArray:
-    """Return in how many of the rounds each of n samples was rated; DataError if a round names another sample."""
+    """Return in how many of the rounds each of n samples was to be rated; DataError if a round names another sample."""
     times = np.zeros(n, dtype=np.intp)
     for number, found in enumerate(rounds, start=1):
         _check_samples(found.samples, n, number)
@@ -277,5 +330,10 @@ def times_rated(rounds: Sequence[Round], n: int) -> IntArray:
 def _check_samples(samples: IntArray, n: int, number: int) -> None:
     if samples.size and not 0 <= int(samples.min()) <= int(samples.max()) < n:
         raise DataError(f"Round {number} has a sample that is not among the {n}, which are numbered 0 to {n - 1}.")
-    if np.unique(samples).size != samples.size:
+    if has_doubles(samples):
         raise DataError(f"Round {number} has a sample twice.")
+
+
+def has_doubles(samples: IntArray) -> bool:
+    """Return whether a sample is there more than once; sorting tells sooner than `numpy.unique`."""
+    return bool((np.diff(np.sort(samples)) == 0).any())

@@ -1,27 +1,19 @@
 """The declaration of a questionnaire: page, validation, scoring, codebook and export derive from it."""
 
-import re
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar, Literal, NamedTuple
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Literal, NamedTuple
 
 import pandas as pd
 
-from evaluation.errors import AnswerError
+from evaluation.errors import AnswerError, EvaluationError
+from evaluation.instruments.answers import ItemError
+from evaluation.instruments.items import Answer, Item, Texts
 
-Texts = Mapping[str, str]
-"""One text per language code, for instance ``{"en": "Angry", "zh": "愤怒的"}``."""
-
-# Only ASCII digits: int() alone would also take "٤", "1_0" and " 4 ".
-_WHOLE_NUMBER = re.compile(r"[+-]?[0-9]{1,9}")
-
-
-class Option(NamedTuple):
-    """One labelled answer of a Likert item."""
-
-    value: int
-    label: Texts
-    description: Texts
+Per = Literal["trial", "clip", "word"]
+"""What the items are asked about: the trial as a whole, each clip that it shows, or each word of its sentence."""
 
 
 class CodebookRow(NamedTuple):
@@ -35,121 +27,76 @@ class CodebookRow(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class BipolarItem:
-    """A pair of adjectives with a row of points between them.
-
-    Parameters
-    ----------
-    id : str
-        Name of the item, unique in its instrument.
-    left, right : mapping of str to str
-        The adjective at the lowest and at the highest value, per language.
-    low, high : int
-        Range of the answer, both included.
-    """
-
-    kind: ClassVar[Literal["bipolar"]] = "bipolar"
-    id: str
-    left: Texts
-    right: Texts
-    low: int = -4
-    high: int = 4
-
-    @property
-    def values(self) -> tuple[int, ...]:
-        """Return the answers offered, in the order of the page."""
-        return tuple(range(self.low, self.high + 1))
-
-    @property
-    def languages(self) -> frozenset[str]:
-        """Return the languages in which every text of the item is there."""
-        return frozenset(self.left) & frozenset(self.right)
-
-    def text(self, language: str) -> str:
-        """Return the item as one line of a codebook."""
-        return f"{self.left[language]} – {self.right[language]}"
-
-    def describe_values(self, language: str) -> str:
-        """Return what the answers mean as one line of a codebook."""
-        return f"{self.low} ({self.left[language]}) to {self.high} ({self.right[language]})"
-
-
-@dataclass(frozen=True, kw_only=True)
-class LikertItem:
-    """A question with labelled answers.
-
-    Parameters
-    ----------
-    id : str
-        Name of the item, unique in its instrument.
-    prompt : mapping of str to str
-        The question, per language.
-    options : tuple of Option
-        The answers in the order of the page.
-    """
-
-    kind: ClassVar[Literal["likert"]] = "likert"
-    id: str
-    prompt: Texts
-    options: tuple[Option, ...]
-
-    @property
-    def values(self) -> tuple[int, ...]:
-        """Return the answers offered, in the order of the page."""
-        return tuple(option.value for option in self.options)
-
-    @property
-    def languages(self) -> frozenset[str]:
-        """Return the languages in which every text of the item is there."""
-        complete = frozenset(self.prompt)
-        for option in self.options:
-            complete &= frozenset(option.label) & frozenset(option.description)
-        return complete
-
-    def text(self, language: str) -> str:
-        """Return the item as one line of a codebook."""
-        return self.prompt[language]
-
-    def describe_values(self, language: str) -> str:
-        """Return what the answers mean as one line of a codebook."""
-        return "; ".join(f"{option.value} = {option.label[language]}" for option in self.options)
-
-
-Item = BipolarItem | LikertItem
-
-
-@dataclass(frozen=True, kw_only=True)
 class Score:
-    """A number made of the answers: the weighted sum of items over a divisor.
+    """A number made of the answers: the weighted sum of items and a constant, over a divisor.
 
     Parameters
     ----------
     name : str
-        Name of the score, unique over all instruments of a study, since it becomes a column.
+        Name of the score, unique over all instruments of a part of a study, since it becomes a column.
     text : str
         What it measures, and its range.
-    weights : mapping of str to int
-        Weight of each item that takes part.
+    weights : mapping of str to int or fractions.Fraction
+        Weight of each item that takes part, none of them 0.
     divisor : int
-        What the weighted sum is divided by.
+        What the sum is divided by, above 0.
     source : str
         Where the formula is published.
+    constant : int or fractions.Fraction
+        What is added to the weighted items before the division.
     """
 
     name: str
     text: str
-    weights: Mapping[str, int]
+    weights: Mapping[str, int | Fraction]
     divisor: int
     source: str
+    constant: int | Fraction = 0
 
     @property
     def formula(self) -> str:
-        """Return the formula as text, for instance ``(Q1 - Q4 + Q7 - Q10) / 16``."""
-        signs = ["-" if weight < 0 else "+" for weight in self.weights.values()]
-        factors = [item if abs(weight) == 1 else f"{abs(weight)} {item}" for item, weight in self.weights.items()]
-        rest = "".join(f" {sign} {factor}" for sign, factor in zip(signs[1:], factors[1:], strict=True))
-        total = signs[0].removeprefix("+") + factors[0] + rest
-        return total if self.divisor == 1 else f"({total}) / {self.divisor}"
+        """Return the formula as text, for instance ``(Q1 - Q4 + Q7 - Q10) / 16``; `parse_formula` reads it."""
+        weights, constant, divisor = self._whole()
+        terms = [(weight < 0, _times(abs(weight), item)) for item, weight in weights.items()]
+        if constant:
+            terms.append((constant < 0, str(abs(constant))))
+        rest = "".join(f" {'-' if negative else '+'} {term}" for negative, term in terms[1:])
+        total = ("-" if terms[0][0] else "") + terms[0][1] + rest
+        if divisor == 1:
+            return total
+        return f"({total}) / {divisor}" if len(terms) > 1 else f"{total} / {divisor}"
+
+    def value(self, answers: Mapping[str, int]) -> float:
+        """Return the score of one set of answers, which holds every item of `weights`."""
+        total = sum((weight * answers[item] for item, weight in self.weights.items()), start=Fraction(self.constant))
+        return float(total / self.divisor)
+
+    def column(self, answers: pd.DataFrame) -> pd.Series:
+        """Return the score of each row; NaN where an item of `weights` is missing."""
+        weights, constant, divisor = self._whole()
+        # Whole numbers make the sum exact, so that a row scores as `value` does.
+        values = answers[list(weights)].to_numpy(dtype=float)
+        return pd.Series((values @ list(weights.values()) + constant) / divisor, index=answers.index, dtype=float)
+
+    def describe_values(self, values: Mapping[str, Sequence[int]]) -> str:
+        """Return range and steps as one line of a codebook, given the answers that each item offers."""
+        low = high = Fraction(self.constant)
+        steps = []
+        for item, weight in self.weights.items():
+            ends = sorted((weight * min(values[item]), weight * max(values[item])))
+            low, high = low + ends[0], high + ends[1]
+            steps.append(Fraction(weight) * math.gcd(*(value - values[item][0] for value in values[item])))
+        scale = math.lcm(*(step.denominator for step in steps))
+        step = Fraction(math.gcd(*(int(step * scale) for step in steps)), scale) / self.divisor
+        ends_text = f"{float(low / self.divisor):g} to {float(high / self.divisor):g}"
+        return f"{ends_text}, in steps of {float(step):g}"
+
+    def _whole(self) -> tuple[dict[str, int], int, int]:
+        """Return weights, constant and divisor as whole numbers of the same formula."""
+        numbers = [*self.weights.values(), self.constant]
+        scale = math.lcm(*(number.denominator for number in numbers))
+        weights = {item: int(weight * scale) for item, weight in self.weights.items()}
+        return weights, int(self.constant * scale), self.divisor * scale
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,12 +109,16 @@ class Instrument:
         Name in study files and in the export.
     title, instruction : mapping of str to str
         Heading, and what the rater is asked to do, per language.
-    items : tuple of BipolarItem or LikertItem
+    items : tuple of items
         The items in the order of the page.
     scores : tuple of Score
         What is computed from the answers.
     source : str
         Where the instrument is published.
+    per : {"trial", "clip", "word"}
+        Whether the items are asked once in a trial, for each clip that it shows, or for each word of its sentence.
+    clips : tuple of str, optional
+        Which values of a presentation's ``together`` the instrument needs; None if it can do with any.
     """
 
     name: str
@@ -176,6 +127,8 @@ class Instrument:
     items: tuple[Item, ...]
     scores: tuple[Score, ...]
     source: str
+    per: Per = "trial"
+    clips: tuple[str, ...] | None = None
 
     @property
     def languages(self) -> tuple[str, ...]:
@@ -185,56 +138,110 @@ class Instrument:
             complete &= item.languages
         return tuple(sorted(complete))
 
-    def validate(self, raw: Mapping[str, str | int]) -> dict[str, int]:
-        """Return the answers as whole numbers, in the order of the items.
+    def expanded(self, *, clips: int = 1, words: Sequence[str] = ()) -> "Instrument":
+        """Return the instrument as one trial asks it.
 
         Parameters
         ----------
-        raw : mapping of str to str or int
-            Answer of each item, as sent by a form (``"-3"``) or as JSON (``-3``). Only the items of this
-            instrument are read; other keys (a form's token, another instrument) are left alone.
+        clips : int
+            How many clips the trial shows, for an instrument that asks about each clip.
+        words : sequence of str
+            The words of the sentence, for an instrument that asks about each word.
 
         Returns
         -------
-        dict of str to int
-            One answer for each item.
+        Instrument
+            Itself if its items are asked once in a trial. Otherwise one with every item for each clip or word: the
+            items of the k-th (from 1) have ids that end in ``-k`` and prompts that begin with the clip's letter or
+            the word. It has no scores, which are computed for each clip or word: see `by_place`.
+
+        Raises
+        ------
+        EvaluationError
+            If there is no clip or word to ask about.
+        """
+        if self.per == "trial":
+            return self
+        subjects = [clip_letter(place) for place in range(1, clips + 1)] if self.per == "clip" else list(words)
+        if not subjects:
+            raise EvaluationError(f"{self.name} asks about each {self.per}, but there is none.")
+        items = tuple(
+            replace(item, id=f"{item.id}-{place}", prompt=_about(subject, item.prompt, item.languages))
+            for place, subject in enumerate(subjects, start=1)
+            for item in self.items
+        )
+        return replace(self, items=items, scores=(), per="trial")
+
+    def by_place(self, answers: Mapping[str, Answer]) -> dict[int, dict[str, Answer]]:
+        """Return the answers to an expanded instrument for each clip or word, by this instrument's item ids.
+
+        Parameters
+        ----------
+        answers : mapping of str to answer
+            As `validate` of the expanded instrument returns them.
+
+        Returns
+        -------
+        dict of int to dict
+            The answers about the k-th clip or word by k, counted from 1, each as `score` takes them.
+
+        Raises
+        ------
+        EvaluationError
+            If an answer is not to one of the expanded instrument's items.
+        """
+        known = {item.id for item in self.items}
+        places: dict[int, dict[str, Answer]] = {}
+        for key, answer in answers.items():
+            item, _, place = key.rpartition("-")
+            if item not in known or not (place.isascii() and place.isdecimal()):
+                raise EvaluationError(f"{self.name} has no item {key!r}; right is an item's id, - and a number.")
+            places.setdefault(int(place), {})[item] = answer
+        return dict(sorted(places.items()))
+
+    def validate(self, raw: Mapping[str, object]) -> dict[str, Answer]:
+        """Return the answers in the order of the items.
+
+        Parameters
+        ----------
+        raw : mapping of str to object
+            Answer of each item, as sent by a form (``"-3"``) or as JSON (``-3``; a list for a multiple choice). Only
+            the items of this instrument are read; other keys (a form's token, another instrument) are left alone.
+
+        Returns
+        -------
+        dict of str to answer
+            One answer for each item that has one; only optional items may lack it.
 
         Raises
         ------
         AnswerError
-            If an item is missing or empty, not a whole number, or not one of the values offered. A missing answer
-            is never replaced by zero or any other value.
+            If the answer to an item that needs one is missing or empty, or an answer is not one of those offered. A
+            missing answer is never replaced by zero or any other value.
         """
-        return {item.id: self.validate_item(item, raw.get(item.id)) for item in self.items}
+        answers = {item.id: self.validate_item(item, raw.get(item.id)) for item in self.items}
+        return {item: answer for item, answer in answers.items() if answer is not None}
 
-    def validate_item(self, item: Item, raw: str | int | None) -> int:
-        """Return the answer to one item as a whole number.
+    def validate_item(self, item: Item, raw: object) -> Answer | None:
+        """Return the answer to one item; None if it is optional and left out.
 
         Raises
         ------
         AnswerError
             As `validate`.
         """
-        right = _range_text(item.values)
-        if raw is None or raw == "":
-            raise AnswerError(self.name, item.id, "there is no answer", right)
-        if isinstance(raw, str) and _WHOLE_NUMBER.fullmatch(raw):
-            value = int(raw)
-        elif isinstance(raw, int) and not isinstance(raw, bool):
-            value = raw
-        else:
-            raise AnswerError(self.name, item.id, f"{raw!r} is not a whole number", right)
-        if value not in item.values:
-            raise AnswerError(self.name, item.id, f"{value} is not one of the answers offered", right)
-        return value
+        try:
+            return item.parse(raw)
+        except ItemError as error:
+            raise AnswerError(self.name, item.id, error.message, error.right) from error
 
-    def score(self, answers: Mapping[str, int]) -> dict[str, float]:
+    def score(self, answers: Mapping[str, object]) -> dict[str, float]:
         """Return the scores of one complete set of answers.
 
         Parameters
         ----------
-        answers : mapping of str to int
-            As returned by `validate`.
+        answers : mapping of str to answer
+            As returned by `validate`; for an instrument that asks about each clip or word, the answers about one.
 
         Returns
         -------
@@ -244,13 +251,11 @@ class Instrument:
         Raises
         ------
         AnswerError
-            If an answer that a score needs is missing or not valid.
+            If an answer is missing or not valid.
         """
         checked = self.validate(answers)
-        return {
-            score.name: sum(weight * checked[item] for item, weight in score.weights.items()) / score.divisor
-            for score in self.scores
-        }
+        numbers = {item: answer for item, answer in checked.items() if isinstance(answer, int)}
+        return {score.name: score.value(numbers) for score in self.scores}
 
     def score_table(self, answers: pd.DataFrame) -> pd.DataFrame:
         """Return the scores of many sets of answers at once.
@@ -258,50 +263,53 @@ class Instrument:
         Parameters
         ----------
         answers : pandas.DataFrame
-            One row for each set of answers, one numeric column for each item; NaN where an answer is missing.
+            One row for each set of answers, one numeric column for each item that a score needs; NaN where an answer
+            is missing.
 
         Returns
         -------
         pandas.DataFrame
             The same rows, one column for each score; NaN where an item the score needs is missing.
         """
-        columns = {}
-        for score in self.scores:
-            values = answers[list(score.weights)].to_numpy(dtype=float)
-            columns[score.name] = values @ list(score.weights.values()) / score.divisor
-        return pd.DataFrame(columns, index=answers.index)
+        return pd.DataFrame({score.name: score.column(answers) for score in self.scores}, index=answers.index)
 
     def codebook(self) -> list[CodebookRow]:
-        """Return one row for each item and each score, in English."""
+        """Return one row for each item and each score, in English or, if it has none, in its first language."""
+        language = "en" if "en" in self.languages else self.languages[0]
+        suffix, about = ("", "") if self.per == "trial" else ("-k", f" (of the {self.per} k, from 1)")
         items = [
             CodebookRow(
-                variable=f"{self.name}.{item.id}",
-                text=item.text("en"),
-                values=item.describe_values("en"),
+                variable=f"{self.name}.{item.id}{suffix}",
+                text=f"{item.text(language)}{about}",
+                values=item.describe_values(language),
                 scoring=", ".join(self._used_in(item.id)),
                 source=self.source,
             )
             for item in self.items
         ]
+        values = {item.id: item.values for item in self.items}
+        each = "" if self.per == "trial" else f" (of each {self.per})"
         scores = [
-            CodebookRow(score.name, score.text, self._score_range(score), score.formula, score.source)
+            CodebookRow(score.name, f"{score.text}{each}", score.describe_values(values), score.formula, score.source)
             for score in self.scores
         ]
         return items + scores
 
     def _used_in(self, item: str) -> list[str]:
-        return [f"{score.name} ({score.weights[item]:+d})" for score in self.scores if item in score.weights]
-
-    def _score_range(self, score: Score) -> str:
-        values = {item.id: item.values for item in self.items}
-        products = [sorted(weight * value for value in values[item]) for item, weight in score.weights.items()]
-        low = sum(product[0] for product in products) / score.divisor
-        high = sum(product[-1] for product in products) / score.divisor
-        return f"{low:g} to {high:g}, in steps of {1 / score.divisor:g}"
+        weights = {score.name: score.weights[item] for score in self.scores if item in score.weights}
+        return [f"{name} ({'+' if weight > 0 else ''}{weight})" for name, weight in weights.items()]
 
 
-def _range_text(values: Sequence[int]) -> str:
-    low, high = min(values), max(values)
-    if len(values) == high - low + 1:
-        return f"a whole number from {low} to {high}"
-    return f"one of {', '.join(str(value) for value in values)}"
+def clip_letter(place: int) -> str:
+    """Return how people call the clip at a place, counted from 1: A, B ... Z, then 27, 28 ..."""
+    return chr(ord("A") + place - 1) if place <= 26 else str(place)
+
+
+def _about(subject: str, prompt: Texts | None, languages: frozenset[str]) -> Texts:
+    if prompt is None:
+        return dict.fromkeys(sorted(languages), subject)
+    return {language: f"{subject} – {text}" for language, text in prompt.items()}
+
+
+def _times(factor: int, item: str) -> str:
+    return item if factor == 1 else f"{factor} * {item}"

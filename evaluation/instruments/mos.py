@@ -1,6 +1,7 @@
 """mos5: the five-point opinion scale of the MTAP article."""
 
-from evaluation.instruments.base import Instrument, LikertItem, Option, Score
+from evaluation.instruments.base import Instrument, Score
+from evaluation.instruments.items import LikertItem, Option
 
 _SOURCE = "Jia et al. (2013), Multimedia Tools and Applications, section 5.4"
 

@@ -1,6 +1,7 @@
 """pad12: the abbreviated PAD emotion scale, twelve pairs of adjectives with nine points each."""
 
-from evaluation.instruments.base import BipolarItem, Instrument, Score
+from evaluation.instruments.base import Instrument, Score
+from evaluation.instruments.items import BipolarItem
 
 _EQ13 = "Jia et al. (2013), Multimedia Tools and Applications, Eq. 13"
 

@@ -1,19 +1,42 @@
 """The analysis of a study: what its answers say, and what they cannot say yet."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeVar
 
 import pandas as pd
 
-from evaluation import instruments
 from evaluation.errors import InsufficientDataError
-from evaluation.responses import DIMENSIONS, INPUT_COLUMNS, RESPONSE_COLUMNS, check_responses, score_trials
+from evaluation.report.notes import notes_on, people
+from evaluation.report.ratings import (
+    RepeatedScore,
+    Unavailable,
+    VotesOfCell,
+    opinions_by,
+    preference_scores,
+    repeated_scores,
+    votes_by_cell,
+)
+from evaluation.responses import (
+    DIMENSIONS,
+    INPUT_COLUMNS,
+    KEY,
+    RESPONSE_COLUMNS,
+    asked_about_clips,
+    check_responses,
+    complete,
+    numbers_of,
+    pad_instruments,
+    score_trials,
+    statistical,
+)
+from evaluation.screening import ScreeningReport
 from evaluation.statistics.anova import OneWayAnova, one_way
+from evaluation.statistics.bradley_terry import BradleyTerry
 from evaluation.statistics.correlation import Correlation, pearson
 from evaluation.statistics.opinion import OpinionScore, opinion_score, opinion_table
-from evaluation.study import StudySpec
+from evaluation.study import MAIN, Cell, StudySpec
 
 __all__ = [
     "ANOVA_UNIT",
@@ -43,17 +66,6 @@ MOS_UNIT = (
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Unavailable:
-    """A result that cannot be computed from what there is, and why."""
-
-    reason: str
-
-    def summary(self) -> str:
-        """Return the reason."""
-        return self.reason
-
-
 @dataclass(frozen=True, kw_only=True)
 class ReverseEvaluation:
     """Input against evaluated PAD over the stimuli; `condition` is None for the ratings of all conditions together."""
@@ -78,20 +90,24 @@ class MosOfCondition:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StudyReport:
-    """What a study's answers say.
+    """What a study's answers say, or those of one of its parts.
 
     Attributes
     ----------
     spec : StudySpec
         The study.
+    study : StudySpec
+        The whole study, if the report is on a part of it.
+    conditions : tuple of str
+        The conditions that are shown, in the order of the study file.
     participants, trials : int
         How many participants gave an answer, and in how many trials.
     responses : int
-        How many questionnaires were answered (one instrument in one trial).
+        How many questionnaires were answered (one instrument about one clip of one trial).
     incomplete : int
         How many of these lack an item, and so have no score.
     scores : pandas.DataFrame
-        One row for each trial, as `evaluation.responses.score_trials`.
+        One row for each clip of each trial, as `evaluation.responses.score_trials`.
     pad_by_stimulus : pandas.DataFrame
         For each stimulus over all conditions: n, input_P, input_A, input_D, and the means P, A, D.
     pad_by_cell : pandas.DataFrame
@@ -104,11 +120,26 @@ class StudyReport:
         For each stimulus in each condition: n, mean, sd, ci_low, ci_high.
     mos_anova : OneWayAnova or Unavailable
         Comparison of the conditions; see `ANOVA_UNIT`.
+    scores_by_condition, scores_by_cell : pandas.DataFrame
+        For each score but MOS, and each number that is in no score, in each condition (and stimulus): score, condition,
+        n, mean, sd, ci_low, ci_high.
+    votes : tuple of VotesOfCell
+        How raters chose in each single choice about one clip.
+    preferences : BradleyTerry, Unavailable or None
+        Scores of the conditions from comparisons of two clips; None if there are none in the study.
+    repeats : tuple of RepeatedScore
+        How well raters agree with themselves in hidden repeats; empty if there are none.
+    screening : ScreeningReport or None
+        What became of the raters; None if the study screens nobody.
+    used : StudyReport or None
+        The same analysis with the raters whom screening leaves; None if it excludes nobody.
     notes : tuple of str
         What a reader has to know before using the numbers.
     """
 
     spec: StudySpec
+    study: StudySpec
+    conditions: tuple[str, ...]
     participants: int
     trials: int
     responses: int
@@ -120,18 +151,53 @@ class StudyReport:
     mos_by_condition: tuple[MosOfCondition, ...]
     mos_by_cell: pd.DataFrame
     mos_anova: OneWayAnova | Unavailable
+    scores_by_condition: pd.DataFrame
+    scores_by_cell: pd.DataFrame
+    votes: tuple[VotesOfCell, ...]
+    preferences: BradleyTerry | Unavailable | None
+    repeats: tuple[RepeatedScore, ...]
+    screening: ScreeningReport | None
+    used: "StudyReport | None"
     notes: tuple[str, ...]
 
+    @property
+    def digest(self) -> str:
+        """Digest of the whole study's content."""
+        return self.study.digest
 
-def analyse(spec: StudySpec, responses: pd.DataFrame) -> StudyReport:
+    @property
+    def part(self) -> str | None:
+        """Name of the part; None if the study has no parts, or the report is on several."""
+        names = [part.name for part in self.spec.all_parts]
+        return names[0] if self.spec.parts is not None and len(names) == 1 and names != [MAIN] else None
+
+
+def analyse(
+    spec: StudySpec,
+    responses: pd.DataFrame,
+    *,
+    preferences: pd.DataFrame | None = None,
+    repeats: pd.DataFrame | None = None,
+    screening: ScreeningReport | None = None,
+) -> StudyReport:
     """Analyse what a study has collected.
+
+    A study with parts is analysed part by part, each with its own answers: ``analyse(spec.only("exp1"), ...)``.
 
     Parameters
     ----------
     spec : StudySpec
         The study.
     responses : pandas.DataFrame
-        One row for each answered item with the columns `RESPONSE_COLUMNS`; it may be empty.
+        One row for each answered item with the columns `RESPONSE_COLUMNS`, and those of `OPTIONAL_COLUMNS` if need be;
+        it may be empty.
+    preferences : pandas.DataFrame, optional
+        One row for each comparison of two clips: participant, trial, condition_a, condition_b, and preferred, the name
+        of either.
+    repeats : pandas.DataFrame, optional
+        One row for each score of each trial that was repeated: participant, score, first, second.
+    screening : ScreeningReport, optional
+        Which raters are used. If some are not, the report has all results once more without them.
 
     Returns
     -------
@@ -141,13 +207,14 @@ def analyse(spec: StudySpec, responses: pd.DataFrame) -> StudyReport:
     Raises
     ------
     DataError
-        If `responses` does not fit the study; see `evaluation.responses.check_responses`.
+        If `responses` does not fit the study (see `evaluation.responses.check_responses`), or `preferences` names
+        conditions that the study does not show.
 
     References
     ----------
     Jia et al. (2013), section 5.2 with Table 8 (reverse evaluation) and section 5.4 with Table 10 (opinion scores).
     """
-    table = check_responses(spec, responses)
+    table = complete(check_responses(spec, responses))
     scores = score_trials(spec, table)
     for column in (*DIMENSIONS, "MOS"):
         if column not in scores:
@@ -155,22 +222,67 @@ def analyse(spec: StudySpec, responses: pd.DataFrame) -> StudyReport:
     pad_by_stimulus = _mean_pad(scores, ["stimulus"], spec)
     pad_by_cell = _mean_pad(scores, ["stimulus", "condition"], spec)
     mos_by_cell = _in_study_order(opinion_table(scores, score="MOS", by=["stimulus", "condition"]), spec)
-    answered = table.groupby(["participant", "trial", "instrument"])["item"].size()
+    shown = _rated_cells(spec)
+    conditions = tuple(c.name for c in spec.conditions if c.name in {cell.condition for cell in shown})
+    numbers = [name for one in asked_about_clips(spec) for name in numbers_of(one) if name != "MOS"]
+    screened = screening if screening is not None and screening.findings else None
     return StudyReport(
         spec=spec,
-        participants=int(table["participant"].nunique()),
-        trials=len(scores),
-        responses=len(answered),
-        incomplete=_incomplete(spec, answered),
+        study=spec,
+        conditions=conditions,
+        participants=people(table, preferences),
+        trials=_number_of_trials(table, preferences),
+        responses=len(table.drop_duplicates([*KEY, "instrument"])),
+        incomplete=_incomplete(spec, table),
         scores=scores,
         pad_by_stimulus=pad_by_stimulus,
         pad_by_cell=pad_by_cell,
-        reverse_evaluation=_reverse_evaluation(spec, pad_by_stimulus, pad_by_cell),
-        mos_by_condition=tuple(_mos(spec, scores, condition.name) for condition in spec.conditions),
+        reverse_evaluation=_reverse_evaluation(spec, conditions, pad_by_stimulus, pad_by_cell),
+        mos_by_condition=tuple(_mos(spec, scores, condition) for condition in conditions),
         mos_by_cell=mos_by_cell,
-        mos_anova=_mos_anova(spec, mos_by_cell),
-        notes=_notes(spec, table, pad_by_cell, mos_by_cell),
+        mos_anova=_mos_anova(spec, conditions, mos_by_cell),
+        scores_by_condition=_in_study_order(opinions_by(scores, numbers, ["condition"]), spec, first=numbers),
+        scores_by_cell=_in_study_order(opinions_by(scores, numbers, ["stimulus", "condition"]), spec, first=numbers),
+        votes=votes_by_cell(spec, table, shown),
+        preferences=preference_scores(preferences, conditions) if _compares(spec) else None,
+        repeats=repeated_scores(repeats),
+        screening=screened,
+        used=_with_used(spec, table, preferences, repeats, screened),
+        notes=notes_on(spec, table, preferences, len(shown), {"PAD": pad_by_cell, "MOS": mos_by_cell}),
     )
+
+
+def _rated_cells(spec: StudySpec) -> tuple[Cell, ...]:
+    """Return what counting trials show; training and gold clips may be others."""
+    rated = {cell for part in spec.all_parts for cell in spec.cells(part.name)}
+    return tuple(cell for cell in spec.cells() if cell in rated)
+
+
+def _number_of_trials(table: pd.DataFrame, preferences: pd.DataFrame | None) -> int:
+    frames = [table] if preferences is None else [table, preferences]
+    return len({key for one in frames for key in zip(one["participant"], one["trial"], strict=True)})
+
+
+def _compares(spec: StudySpec) -> bool:
+    return "paired" in spec.instrument_names
+
+
+def _with_used(
+    spec: StudySpec,
+    table: pd.DataFrame,
+    preferences: pd.DataFrame | None,
+    repeats: pd.DataFrame | None,
+    screening: ScreeningReport | None,
+) -> StudyReport | None:
+    if screening is None or len(screening.used) == len(screening.raters):
+        return None
+    excluded = {rater.participant for rater in screening.raters if not rater.used}
+
+    def left(frame: pd.DataFrame | None) -> pd.DataFrame | None:
+        return None if frame is None else frame[~frame["participant"].isin(excluded)]
+
+    rest = table[~table["participant"].isin(excluded)]
+    return analyse(spec, rest, preferences=left(preferences), repeats=left(repeats))
 
 
 def _mean_pad(scores: pd.DataFrame, by: list[str], spec: StudySpec) -> pd.DataFrame:
@@ -181,8 +293,9 @@ def _mean_pad(scores: pd.DataFrame, by: list[str], spec: StudySpec) -> pd.DataFr
     return _in_study_order(means.reset_index(), spec)
 
 
-def _in_study_order(frame: pd.DataFrame, spec: StudySpec) -> pd.DataFrame:
+def _in_study_order(frame: pd.DataFrame, spec: StudySpec, *, first: Sequence[str] = ()) -> pd.DataFrame:
     ranks = {
+        "score": {name: place for place, name in enumerate(first)},
         "stimulus": {stimulus.id: place for place, stimulus in enumerate(spec.stimuli)},
         "condition": {condition.name: place for place, condition in enumerate(spec.conditions)},
     }
@@ -191,13 +304,11 @@ def _in_study_order(frame: pd.DataFrame, spec: StudySpec) -> pd.DataFrame:
 
 
 def _reverse_evaluation(
-    spec: StudySpec, pad_by_stimulus: pd.DataFrame, pad_by_cell: pd.DataFrame
+    spec: StudySpec, conditions: Sequence[str], pad_by_stimulus: pd.DataFrame, pad_by_cell: pd.DataFrame
 ) -> tuple[ReverseEvaluation, ...]:
     parts: list[tuple[str | None, pd.DataFrame]] = [(None, pad_by_stimulus)]
-    if len(spec.conditions) > 1:
-        parts += [
-            (condition.name, pad_by_cell[pad_by_cell["condition"] == condition.name]) for condition in spec.conditions
-        ]
+    if len(conditions) > 1:
+        parts += [(condition, pad_by_cell[pad_by_cell["condition"] == condition]) for condition in conditions]
     return tuple(
         ReverseEvaluation(dimension=dimension, condition=condition, result=_correlate(spec, frame, dimension))
         for condition, frame in parts
@@ -206,10 +317,11 @@ def _reverse_evaluation(
 
 
 def _correlate(spec: StudySpec, means: pd.DataFrame, dimension: str) -> Correlation | Unavailable:
-    if "pad12" not in spec.instruments:
-        return Unavailable("This study does not ask pad12, so there is no evaluated PAD.")
+    names = pad_instruments(spec)
+    if not names:
+        return Unavailable("This study does not ask pad12, pad5 or sam, so there is no evaluated PAD.")
     if means.empty:
-        return Unavailable("No face has been rated with pad12 yet.")
+        return Unavailable(f"No face has been rated with {' or '.join(names)} yet.")
     known = means.dropna(subset=[f"input_{dimension}"])
     if known.empty:
         return Unavailable("The clips name no input PAD to compare with.")
@@ -219,7 +331,7 @@ def _correlate(spec: StudySpec, means: pd.DataFrame, dimension: str) -> Correlat
 def _mos(spec: StudySpec, scores: pd.DataFrame, condition: str) -> MosOfCondition:
     ratings = scores.loc[scores["condition"] == condition, "MOS"].dropna()
     result: OpinionScore | Unavailable
-    if "mos5" not in spec.instruments:
+    if "mos5" not in spec.instrument_names:
         result = Unavailable("This study does not ask mos5, so there is no opinion score.")
     elif ratings.empty:
         result = Unavailable("No clip of this condition has been rated with mos5 yet.")
@@ -228,17 +340,15 @@ def _mos(spec: StudySpec, scores: pd.DataFrame, condition: str) -> MosOfConditio
     return MosOfCondition(condition=condition, result=result)
 
 
-def _mos_anova(spec: StudySpec, mos_by_cell: pd.DataFrame) -> OneWayAnova | Unavailable:
-    if "mos5" not in spec.instruments:
+def _mos_anova(spec: StudySpec, conditions: Sequence[str], mos_by_cell: pd.DataFrame) -> OneWayAnova | Unavailable:
+    if "mos5" not in spec.instrument_names:
         return Unavailable("This study does not ask mos5, so there is no opinion score.")
-    if len(spec.conditions) < 2:
+    if len(conditions) < 2:
         return Unavailable("The study has one condition, so there is nothing to compare.")
     if mos_by_cell.empty:
         return Unavailable("No clip has been rated with mos5 yet.")
     means = mos_by_cell["mean"]
-    groups = {
-        condition.name: means[mos_by_cell["condition"] == condition.name].to_numpy() for condition in spec.conditions
-    }
+    groups = {name: means[mos_by_cell["condition"] == name].to_numpy() for name in conditions}
     return _or_reason(lambda: one_way(groups))
 
 
@@ -249,22 +359,17 @@ def _or_reason(compute: Callable[[], T]) -> T | Unavailable:
         return Unavailable(str(error))
 
 
-def _incomplete(spec: StudySpec, answered: pd.Series) -> int:
-    items = {name: len(instruments.get(name).items) for name in spec.instruments}
-    names = answered.index.get_level_values("instrument")
-    return int((answered.to_numpy() < names.map(items).to_numpy()).sum())
-
-
-def _notes(
-    spec: StudySpec, table: pd.DataFrame, pad_by_cell: pd.DataFrame, mos_by_cell: pd.DataFrame
-) -> tuple[str, ...]:
-    if table.empty:
-        return ("There are no answers yet.",)
-    notes = []
-    if table["participant"].nunique() == 1:
-        notes.append("All answers come from one participant; they say nothing about how people differ.")
-    for name, frame in (("pad12", pad_by_cell), ("mos5", mos_by_cell)):
-        open_cells = len(spec.cells()) - len(frame)
-        if name in spec.instruments and open_cells:
-            notes.append(f"{open_cells} of {len(spec.cells())} clips have not been rated with {name} yet.")
-    return tuple(notes)
+def _incomplete(spec: StudySpec, table: pd.DataFrame) -> int:
+    needed = {
+        (one.name, item.id): sum(other.required for other in statistical(one))
+        for one in asked_about_clips(spec)
+        for item in statistical(one)
+        if item.required
+    }
+    expected = pd.Series(
+        [needed.get(key) for key in zip(table["instrument"], table["item"], strict=True)],
+        index=table.index,
+        dtype=float,
+    )
+    answered = expected.dropna().groupby([table[column] for column in (*KEY, "instrument")]).agg(["size", "first"])
+    return int((answered["size"] < answered["first"]).sum())

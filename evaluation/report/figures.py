@@ -129,7 +129,7 @@ def mos_by_condition(report: StudyReport) -> Figure:
             _draw_opinion(axes, place, found.result, colour, shape)
         else:
             axes.text(place, 3.5, "no ratings\nyet", ha="center", va="center", color=SOFT, fontsize=9)
-    names = [drawable(label(report.spec.condition(c.name).label), c.name) for c in report.spec.conditions]
+    names = [drawable(label(report.spec.condition(name).label), name) for name in report.conditions]
     axes.set_xticks(range(len(names)), names)
     axes.set_xlim(-0.6, len(names) - 0.4)
     options = sorted(MOS5.items[0].options, key=lambda option: option.value) if MOS5.items[0].kind == "likert" else []
@@ -163,9 +163,9 @@ def _draw_dimension(axes: Axes, report: StudyReport, found: ReverseEvaluation, l
     axes.axhline(0, color=GRID, linewidth=1, zorder=0)
     axes.axvline(0, color=GRID, linewidth=1, zorder=0)
     axes.plot([-limit, limit], [-limit, limit], color=SOFT, linewidth=1, linestyle=(0, (4, 3)), zorder=1)
-    for place, condition in enumerate(report.spec.conditions):
+    for place, condition in enumerate(map(report.spec.condition, report.conditions)):
         cells = report.pad_by_cell[report.pad_by_cell["condition"] == condition.name]
-        if len(report.spec.conditions) > 1 and len(cells):
+        if len(report.conditions) > 1 and len(cells):
             axes.plot(
                 cells[f"input_{dimension}"].to_numpy(dtype=float),
                 cells[dimension].to_numpy(dtype=float),

@@ -22,27 +22,18 @@ def render(report: StudyReport) -> str:
     str
         HTML in English with figures as inline SVG; every text of the study is escaped.
     """
+    sections = tables.sections(report)
+    drawn = [section.name for section in sections if section.name in figures.NAMES]
     # Markup, since matplotlib has escaped the texts in its drawing.
-    drawings = {name: Markup(figures.draw(name, report)) for name in figures.NAMES}  # noqa: S704
+    drawings = {name: Markup(figures.draw(name, report)) for name in drawn}  # noqa: S704
     return _template().render(
-        title=tables.label(report.spec.title),
+        title=tables.title(report),
         report=report,
-        sections=tables.sections(report),
+        sections=sections,
         drawings=drawings,
         caption=figures.caption,
-        headline=_headline(report),
+        headline=tables.headline(report),
     )
-
-
-def _headline(report: StudyReport) -> list[str]:
-    """Return the main results as sentences."""
-    names = {"P": "pleasure", "A": "arousal", "D": "dominance"}
-    sentences = [
-        f"Input and evaluated {names[found.dimension]}: {found.result.summary()}"
-        for found in report.reverse_evaluation
-        if found.condition is None
-    ]
-    return [*sentences, f"Opinion scores of the conditions: {report.mos_anova.summary()}"]
 
 
 @cache

@@ -1,47 +1,24 @@
 """The tables of a report: as text for a terminal, as cells for a page, as frames for files."""
 
-import unicodedata
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import pandas as pd
 
 from evaluation.report.analysis import ANOVA_UNIT, MOS_UNIT, StudyReport, Unavailable
-from evaluation.responses import DIMENSIONS
+from evaluation.report.further_tables import further_frames, further_sections, screened
+from evaluation.report.section import NOTHING, Section, label, lines
+from evaluation.responses import DIMENSIONS, pad_instruments
 from evaluation.statistics import wording
 from evaluation.statistics.anova import OneWayAnova
 from evaluation.statistics.correlation import Correlation
 from evaluation.statistics.opinion import OpinionScore
 
+__all__ = ["ALL_CONDITIONS", "Section", "frames", "headline", "label", "sections", "to_text"]
+
 ALL_CONDITIONS = "all"
-_NOTHING = "–"
 
-
-class Section(NamedTuple):
-    """One table of the report, its cells written out.
-
-    Attributes
-    ----------
-    name : str
-        Name for an anchor or a file.
-    title : str
-        Heading.
-    header : tuple of str
-        Heads of the columns; the first `text_columns` hold text, the others numbers.
-    text_columns : int
-        How many columns hold text.
-    rows : tuple of tuple of str
-        The cells.
-    notes : tuple of str
-        Sentences under the table.
-    """
-
-    name: str
-    title: str
-    header: tuple[str, ...]
-    text_columns: int
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
+_NOT_TWICE = frozenset({"pad_by_stimulus", "mos_by_stimulus", "screening"})
+"""Sections that are not repeated with the raters used alone; their numbers are in `frames`."""
 
 
 def sections(report: StudyReport) -> tuple[Section, ...]:
@@ -55,33 +32,88 @@ def sections(report: StudyReport) -> tuple[Section, ...]:
     Returns
     -------
     tuple of Section
-        Overview, reverse evaluation, evaluated PAD, opinion scores, analysis of variance, opinion scores by stimulus.
+        Overview and screening, reverse evaluation and evaluated PAD, opinion scores and their analysis of variance,
+        other scores, votes, preferences, and repeats, each if the study asks for it. If screening excludes raters, the
+        main tables stand there for all raters and then, under ``NAME_used``, for those whose ratings are used.
     """
-    return (
-        _overview(report),
-        _reverse_evaluation(report),
-        _evaluated_pad(report),
-        _mos_by_condition(report),
-        _mos_anova(report),
-        _mos_by_stimulus(report),
-    )
+    own = _sections(report)
+    if report.used is None:
+        return own
+    used = {section.name: section for section in _sections(report.used)}
+    everybody, left = report.participants, report.used.participants
+    both = []
+    for section in own:
+        if section.name in _NOT_TWICE or section.name not in used:
+            both.append(section)
+            continue
+        other = used[section.name]
+        both.append(section._replace(title=f"{section.title} – all {everybody} raters"))
+        both.append(other._replace(name=f"{other.name}_used", title=f"{other.title} – the {left} raters used"))
+    return tuple(both)
+
+
+def _sections(report: StudyReport) -> tuple[Section, ...]:
+    found = [_overview(report), *screened(report)]
+    if pad_instruments(report.spec):
+        found += [_reverse_evaluation(report), _evaluated_pad(report)]
+    if "mos5" in report.spec.instrument_names:
+        found += [_mos_by_condition(report), _mos_anova(report), _mos_by_stimulus(report)]
+    return (*found, *further_sections(report))
+
+
+def title(report: StudyReport) -> str:
+    """Return the title of the study, with that of the part if it has parts."""
+    study = label(report.spec.title)
+    if report.part is None:
+        return study
+    part = report.spec.part(report.part)
+    return f"{study}: {label(part.title) if part.title else part.name}"
 
 
 def to_text(report: StudyReport) -> str:
     """Return the whole report as aligned plain text, ending with a line break."""
-    title = label(report.spec.title)
-    parts = [f"{title} ({report.spec.slug})"]
-    for section in sections(report):
-        lines = [section.title, "-" * _width(section.title)]
-        if section.rows:
-            lines += _aligned(section)
-        lines += section.notes
-        parts.append("\n".join(lines))
+    place = report.spec.slug if report.part is None else f"{report.spec.slug}, part {report.part}"
+    parts = [f"{title(report)} ({place})", *("\n".join(lines(section)) for section in sections(report))]
     return "\n\n".join(parts) + "\n"
 
 
+def headline(report: StudyReport) -> list[str]:
+    """Return the main results as sentences."""
+    sentences = _headline(report)
+    if report.used is None:
+        return sentences
+    with_used = [f"With the {report.used.participants} raters used: {sentence}" for sentence in _headline(report.used)]
+    return [*sentences, *with_used]
+
+
+def _headline(report: StudyReport) -> list[str]:
+    names = {"P": "pleasure", "A": "arousal", "D": "dominance"}
+    sentences = []
+    if pad_instruments(report.spec):
+        sentences += [
+            f"Input and evaluated {names[found.dimension]}: {found.result.summary()}"
+            for found in report.reverse_evaluation
+            if found.condition is None
+        ]
+    if "mos5" in report.spec.instrument_names:
+        sentences.append(f"Opinion scores of the conditions: {report.mos_anova.summary()}")
+    if report.preferences is not None:
+        sentences.append(f"Preferences: {report.preferences.summary()}")
+    return sentences
+
+
 def frames(report: StudyReport) -> dict[str, pd.DataFrame]:
-    """Return the tables of a report with full digits, by name, for CSV and other files."""
+    """Return the tables of a report with full digits, by name, for CSV and other files.
+
+    If screening excludes raters, each table is there once more, as ``NAME_used``, with the others alone.
+    """
+    own = _frames(report)
+    if report.used is not None:
+        own |= {f"{name}_used": frame for name, frame in _frames(report.used).items() if name != "screening"}
+    return own
+
+
+def _frames(report: StudyReport) -> dict[str, pd.DataFrame]:
     reverse = [
         found.result.to_frame().assign(
             condition=found.condition or ALL_CONDITIONS, dimension=found.dimension, published_r=found.published
@@ -102,14 +134,8 @@ def frames(report: StudyReport) -> dict[str, pd.DataFrame]:
         "mos_by_condition": _stacked(opinions, ["condition"]),
         "mos_by_cell": report.mos_by_cell,
         "mos_anova": anova,
+        **further_frames(report),
     }
-
-
-def label(texts: object) -> str:
-    """Return a text of the study in English, or else in its first language."""
-    if not isinstance(texts, dict):
-        return str(texts)
-    return str(texts.get("en") or next(iter(texts.values())))
 
 
 def _stacked(parts: Sequence[pd.DataFrame], first: list[str]) -> pd.DataFrame:
@@ -135,11 +161,11 @@ def _reverse_evaluation(report: StudyReport) -> Section:
         name = ALL_CONDITIONS if found.condition is None else label(report.spec.condition(found.condition).label)
         published = wording.share(found.published, 3)
         if isinstance(found.result, Unavailable):
-            rows.append((name, found.dimension, *[_NOTHING] * 6, published))
+            rows.append((name, found.dimension, *[NOTHING] * 6, published))
             reasons.append(found.result.reason)
             continue
         result = found.result
-        interval = _NOTHING if result.ci is None else f"{wording.share(result.ci[0])} to {wording.share(result.ci[1])}"
+        interval = NOTHING if result.ci is None else f"{wording.share(result.ci[0])} to {wording.share(result.ci[1])}"
         rows.append(
             (
                 name,
@@ -182,8 +208,11 @@ def _evaluated_pad(report: StudyReport) -> Section:
         )
         for _, row in report.pad_by_stimulus.iterrows()
     ]
+    asked = " or ".join(pad_instruments(report.spec))
     header = ("Stimulus", "n", *(f"input {d}" for d in DIMENSIONS), *(f"evaluated {d}" for d in DIMENSIONS))
-    notes = ("Means over all ratings (n) of all conditions.",) if rows else ("No face has been rated with pad12 yet.",)
+    notes = (
+        ("Means over all ratings (n) of all conditions.",) if rows else (f"No face has been rated with {asked} yet.",)
+    )
     return Section("pad_by_stimulus", "Evaluated PAD of each stimulus", header, 1, tuple(rows), notes)
 
 
@@ -193,11 +222,11 @@ def _mos_by_condition(report: StudyReport) -> Section:
         name = label(report.spec.condition(found.condition).label)
         result = found.result
         if isinstance(result, Unavailable):
-            rows.append((name, "0", _NOTHING, _NOTHING, _NOTHING))
+            rows.append((name, "0", NOTHING, NOTHING, NOTHING))
             reasons.append(result.reason)
             continue
-        sd = _NOTHING if result.sd is None else wording.number(result.sd)
-        ci = _NOTHING if result.ci is None else f"{wording.number(result.ci[0])} to {wording.number(result.ci[1])}"
+        sd = NOTHING if result.sd is None else wording.number(result.sd)
+        ci = NOTHING if result.ci is None else f"{wording.number(result.ci[0])} to {wording.number(result.ci[1])}"
         rows.append((name, str(result.n), wording.number(result.mean), sd, ci))
     title = "Mean opinion score of each condition"
     header = ("Condition", "Ratings", "MOS", "SD", "95% CI")
@@ -225,40 +254,22 @@ def _mos_anova(report: StudyReport) -> Section:
 
 def _mos_by_stimulus(report: StudyReport) -> Section:
     table = report.mos_by_cell
-    names = [condition.name for condition in report.spec.conditions]
+    names = list(report.conditions)
     found = {(row["stimulus"], row["condition"]): row for _, row in table.iterrows()}
     rows = []
     for stimulus in report.spec.stimuli:
         cells = [found.get((stimulus.id, name)) for name in names]
         if any(cell is not None for cell in cells):
-            written = [_NOTHING if cell is None else f"{wording.number(cell['mean'])} ({cell['n']})" for cell in cells]
+            written = [NOTHING if cell is None else f"{wording.number(cell['mean'])} ({cell['n']})" for cell in cells]
             rows.append((label(stimulus.label), *written))
-    header = ("Stimulus", *(label(condition.label) for condition in report.spec.conditions))
+    header = ("Stimulus", *(label(report.spec.condition(name).label) for name in names))
     notes = ("In brackets the number of ratings.",) if rows else ("No clip has been rated with mos5 yet.",)
     return Section("mos_by_stimulus", "Mean opinion score of each stimulus", header, 1, tuple(rows), notes)
 
 
 def _signed(value: float) -> str:
-    return _NOTHING if pd.isna(value) else f"{round(value, 2) + 0.0:.2f}"
+    return NOTHING if pd.isna(value) else f"{round(value, 2) + 0.0:.2f}"
 
 
 def _three(value: float) -> str:
     return wording.number(value, 3)
-
-
-def _aligned(section: Section) -> list[str]:
-    table = [section.header, *section.rows]
-    widths = [max(_width(row[column]) for row in table) for column in range(len(section.header))]
-    lines = []
-    for row in table:
-        cells = []
-        for column, cell in enumerate(row):
-            space = " " * (widths[column] - _width(cell))
-            cells.append(cell + space if column < section.text_columns else space + cell)
-        lines.append("  ".join(cells).rstrip())
-    return lines
-
-
-def _width(text: str) -> int:
-    # A Chinese character takes two columns of a terminal.
-    return sum(2 if unicodedata.east_asian_width(character) in "WF" else 1 for character in text)

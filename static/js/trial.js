@@ -1,98 +1,70 @@
-// The trial page: the clip is watched once before the questions open, and what the player did goes along with them.
+// The questions of a trial: how many are left, which were forgotten, and sent only once.
 "use strict";
 
 (() => {
-  const clip = document.getElementById("clip");
-  const play = document.getElementById("play");
-  const hint = document.getElementById("hint");
   const form = document.getElementById("answers");
-  const questions = document.getElementById("questions");
   const remaining = document.getElementById("remaining");
-  const log = document.getElementById("playback");
-  const MAX_EVENTS = 200;
-  const events = [];
+  // So long nobody waits for a page: whoever presses the button again then means it, and the server takes it once.
+  const SENT_MS = 8000;
 
-  const record = (kind) => {
-    if (events.length < MAX_EVENTS) {
-      events.push([kind, Math.round(performance.now()), Math.round(clip.currentTime * 1000) / 1000]);
+  const answered = (item) => [...item.querySelectorAll("input, textarea")].some((field) => {
+    if (field.type === "radio" || field.type === "checkbox") {
+      return field.checked;
     }
-  };
-  for (const kind of ["play", "pause", "ended", "seeked", "stalled", "waiting", "error"]) {
-    clip.addEventListener(kind, () => record(kind));
-  }
-
-  // Without the browser's own controls nobody skips ahead; a page without scripts keeps them.
-  clip.controls = false;
-  play.hidden = false;
-  hint.hidden = false;
-  hint.textContent = hint.dataset.before;
-  let watched = form.dataset.watched === "yes";
-  const say = (text) => { hint.textContent = text; };
-  const open = () => {
-    questions.disabled = false;
-    document.body.classList.add("watched");
-    play.querySelector("[data-label]").textContent = hint.dataset.again;
-    play.hidden = false;
-    say(hint.dataset.after);
-  };
-  questions.disabled = !watched;
-  if (watched) {
-    open();
-  }
-
-  play.addEventListener("click", () => {
-    clip.currentTime = 0;
-    clip.play().catch(() => say(hint.dataset.error));
+    return field.type !== "range" && field.value.trim() !== "";
   });
-  clip.addEventListener("playing", () => {
-    play.hidden = true;
-    if (!watched) {
-      say(hint.dataset.during);
-    }
-  });
-  clip.addEventListener("ended", () => {
-    const first = !watched;
-    watched = true;
-    open();
-    // The button that was pressed has changed its place: keyboards and screen readers go on with the questions.
-    if (first) {
-      questions.focus({ preventScroll: true });
-    }
-  });
-  // A tab in the background may pause the clip before its end: offer the button again.
-  clip.addEventListener("pause", () => { play.hidden = false; });
-  clip.addEventListener("error", () => say(hint.dataset.error));
+  const required = [...form.querySelectorAll("[data-required]")];
+  const unanswered = () => required.filter((item) => !answered(item));
 
-  const groups = [...new Set([...form.querySelectorAll("input[type=radio]")].map((input) => input.name))];
-  const unanswered = () => groups.filter((name) => !form.querySelector(`input[name="${CSS.escape(name)}"]:checked`));
   const count = () => {
     const left = unanswered().length;
     const template = left === 1 ? remaining.dataset.one : remaining.dataset.many;
     remaining.textContent = left === 0 ? "" : template.replace("{n}", String(left));
   };
-  form.addEventListener("change", (event) => {
-    event.target.closest(".item")?.classList.remove("has-problem");
+  const changed = (event) => {
+    event.target.closest("[data-item]")?.classList.remove("has-problem");
     count();
-  });
+  };
+  form.addEventListener("change", changed);
+  form.addEventListener("input", changed);
   count();
+
+  // A radio button cannot be unticked by itself; where no answer is needed it can be taken back.
+  for (const button of form.querySelectorAll("[data-clear]")) {
+    const item = button.closest("[data-item]");
+    const offer = () => { button.hidden = !answered(item); };
+    item.addEventListener("change", offer);
+    button.addEventListener("click", () => {
+      for (const field of item.querySelectorAll("input")) {
+        field.checked = false;
+      }
+      item.querySelector("input").focus();
+      offer();
+      count();
+    });
+    offer();
+  }
 
   // The browser's own message on a hidden radio button is easily missed on a phone: mark and scroll to the item.
   form.noValidate = true;
   let sent = false;
   form.addEventListener("submit", (event) => {
     const left = unanswered();
-    if (left.length > 0 || sent) {
+    if (left.length > 0) {
       event.preventDefault();
-      for (const name of left) {
-        form.querySelector(`input[name="${CSS.escape(name)}"]`).closest(".item").classList.add("has-problem");
+      for (const item of left) {
+        item.classList.add("has-problem");
       }
-      const missing = form.querySelector(".has-problem");
-      missing?.scrollIntoView({ block: "center", behavior: "smooth" });
-      missing?.querySelector("input").focus({ preventScroll: true });
+      left[0].scrollIntoView({ block: "center", behavior: "smooth" });
+      left[0].querySelector("input:not([type=hidden]), textarea").focus({ preventScroll: true });
+      return;
+    }
+    if (sent) {
+      event.preventDefault();
       return;
     }
     sent = true;
-    log.value = JSON.stringify(events);
+    setTimeout(() => { sent = false; }, SENT_MS);
   });
   // Coming back with the browser's history restores the page as it was left: it may be sent again.
   window.addEventListener("pageshow", () => { sent = false; });

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, expect, sync_playwright
 
 from serving import Server
 
@@ -20,6 +20,10 @@ FLAGS = (
     "--disable-sync",
     "--mute-audio",
 )
+
+
+# A page that is slow, because other tests run at the same time, is no fault.
+expect.set_options(timeout=20_000)
 
 
 @pytest.fixture(scope="session")

@@ -1,10 +1,23 @@
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from evaluation.errors import DataError
 from evaluation.instruments.pad12 import PAD12
-from evaluation.responses import RESPONSE_COLUMNS, check_responses, input_pad, score_trials
+from evaluation.responses import (
+    RESPONSE_COLUMNS,
+    check_responses,
+    input_pad,
+    numbers_of,
+    pad_instruments,
+    score_trials,
+    statistical,
+)
+from evaluation.study import InstrumentUse, Presentation, StudySpec
+
+ROOT = Path(__file__).parents[1]
 
 EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
 
@@ -80,3 +93,74 @@ def test_a_clip_without_three_numbers_has_no_input_pad(demo, pad):
     stimulus = demo.stimuli[0].model_copy(update={"clip": {"pad": pad} if pad is not None else {}})
     spec = demo.model_copy(update={"stimuli": (stimulus,)})
     assert input_pad(spec, "happy", "full") is None
+
+
+class TestFlippedItems:
+    def test_scores_are_made_of_keyed_answers(self, demo, answers):
+        flipped = answers["item"].isin(["Q1", "Q4"])
+        shown = answers.assign(keyed=answers["raw"], raw=answers["raw"].where(~flipped, -answers["raw"]))
+        found = check_responses(demo, shown)
+        assert list(found.columns) == [*RESPONSE_COLUMNS, "keyed"]
+        plain = score_trials(demo, check_responses(demo, answers))
+        pd.testing.assert_frame_equal(score_trials(demo, found), plain)
+
+    def test_keyed_answers_must_be_offered_and_there(self, demo, answers):
+        with pytest.raises(DataError, match=r"hold 7 for pad12\.Q1"):
+            check_responses(demo, answers.assign(keyed=7))
+        with pytest.raises(DataError, match="empty cells in keyed"):
+            check_responses(demo, answers.assign(keyed=None))
+
+
+class TestSeveralClips:
+    @pytest.fixture
+    def side_by_side(self, demo):
+        return demo.model_copy(
+            update={
+                "instruments": (InstrumentUse(use="slider100"),),
+                "presentation": Presentation(assignment="full", together="pairs"),
+            }
+        )
+
+    @staticmethod
+    def rows(*answers):
+        table = [(1, 1, "happy", *answer) for answer in answers]
+        columns = ["participant", "trial", "stimulus", "condition", "raw", "clip"]
+        return pd.DataFrame(table, columns=columns).assign(instrument="slider100", item="quality")
+
+    def test_each_clip_of_a_trial_has_its_own_scores(self, side_by_side):
+        found = score_trials(side_by_side, check_responses(side_by_side, self.rows(("full", 80, 1), ("subtle", 20, 2))))
+        assert found[["trial", "clip", "condition", "quality"]].to_numpy().tolist() == [
+            [1, 1, "full", 80.0],
+            [1, 2, "subtle", 20.0],
+        ]
+
+    def test_one_clip_has_one_answer(self, side_by_side):
+        with pytest.raises(DataError, match=r"two answers of participant 1 to slider100\.quality"):
+            check_responses(side_by_side, self.rows(("full", 80, 1), ("full", 20, 1)))
+
+
+def test_instruments_of_own_and_without_scores_are_numbers_too():
+    source = (ROOT / "data" / "rich.yaml").read_text(encoding="utf-8")
+    own = StudySpec.from_yaml(
+        source.replace('    scores: [{name: clarity, text: "Clarity, from 0 to 1", formula: (clear - 1) / 2}]\n', "")
+    )
+    assert numbers_of(own.instrument("extra")) == ("extra.clear",)
+    assert [item.id for item in statistical(own.instrument("extra"))] == ["clear"]
+    assert statistical(own.instrument("prosodic_words")) == ()
+    assert pad_instruments(own) == ("pad12",)
+    rows = [(1, 1, "happy", "full", "extra", "clear", 3)]
+    found = score_trials(own, check_responses(own, pd.DataFrame(rows, columns=list(RESPONSE_COLUMNS))))
+    assert found["extra.clear"].tolist() == [3.0]
+    with pytest.raises(DataError, match=r"extra\.seen, which the study rich does not ask"):
+        check_responses(own, pd.DataFrame([(*rows[0][:5], "seen", 1)], columns=list(RESPONSE_COLUMNS)))
+
+
+def test_parts_that_ask_the_same_score_share_its_column():
+    source = (ROOT / "data" / "rich.yaml").read_text(encoding="utf-8")
+    spec = StudySpec.from_yaml(
+        source.replace("instruments: [paired, slider100]", "instruments: [sam]").replace(", together: pairs", "")
+    )
+    rows = [(1, 1, "happy", "full", "pad12", f"Q{k}", 1) for k in range(1, 13)]
+    rows += [(1, 20, "happy", "full", "sam", item, 9) for item in "PAD"]
+    found = score_trials(spec, check_responses(spec, pd.DataFrame(rows, columns=list(RESPONSE_COLUMNS))))
+    assert found["P"].tolist() == [0.0, 1.0]

@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -15,8 +17,10 @@ from evaluation.simulate import (
     answer_mos5,
     answer_pad12,
     simulate_responses,
+    simulate_trials,
 )
 from evaluation.statistics.agreement import annotation_agreement
+from evaluation.study import StudySpec
 
 
 def faces(n, seed=7):
@@ -157,3 +161,45 @@ class TestIncrementalAnnotation:
             annotate_incrementally(faces(40), raters=1, rng=np.random.default_rng(1))
         with pytest.raises(DataError, match="from -1 to 1"):
             annotate_incrementally(2 * np.ones((10, 3)), rng=np.random.default_rng(1))
+
+
+RICH = (Path(__file__).parents[1] / "data" / "rich.yaml").read_text(encoding="utf-8")
+
+
+class TestAnyDesign:
+    @pytest.fixture
+    def rich(self):
+        """The rich study without its annotation in rounds."""
+        return StudySpec.from_yaml(RICH[: RICH.index("  - name: words")] + RICH[RICH.index("screening:") :])
+
+    def test_flipped_items_are_given_as_on_the_page(self, rich):
+        frame = simulate_responses(rich, 3, seed=1)
+        assert list(frame.columns) == [*RESPONSE_COLUMNS, "keyed", "clip"]
+        pad12 = frame[frame["instrument"] == "pad12"]
+        turned = pad12[pad12["raw"] != pad12["keyed"]]
+        assert (turned["raw"] == -turned["keyed"]).all()
+        assert turned.groupby(["participant", "trial"]).size().between(1, 6).all()
+
+    def test_what_is_no_statistic_is_in_the_trials_alone(self, rich):
+        frame = simulate_responses(rich, 2, seed=1)
+        assert set(frame["instrument"]) == {"pad12", "emotion14", "extra", "slider100"}
+        assert set(frame.loc[frame["instrument"] == "extra", "item"]) == {"clear"}
+        assert sorted(frame.loc[frame["instrument"] == "slider100", "clip"].unique()) == [1, 2]
+        made = list(simulate_trials(rich, 2, seed=1))
+        assert [trial.trial for trial in made if trial.participant == 1] == list(range(1, 15))
+        assert {trial.kind for trial in made} == {"before", "rating", "repeat", "gold", "instructed"}
+        assert {trial.part for trial in made} == {"faces", "pairs"}
+        assert all("paired" in trial.raw for trial in made if trial.part == "pairs")
+        assert all(trial.keyed["extra"]["clear"] == 3 for trial in made if trial.kind == "instructed")
+
+    def test_rounds_cannot_be_simulated_beforehand(self):
+        with pytest.raises(DataError, match="Part words is annotated in rounds"):
+            simulate_responses(StudySpec.from_yaml(RICH), 1, seed=1)
+
+    def test_words_are_answered_word_by_word(self):
+        spec = StudySpec.from_yaml(
+            RICH.replace("    annotation: {mode: consensus, raters: 3, agree: 2, stop: {rounds: 2}}\n", "")
+        )
+        words = [trial for trial in simulate_trials(spec, 1, seed=1) if trial.part == "words"]
+        by_stimulus = {trial.cells[0].stimulus: list(trial.raw["prosodic_words"]) for trial in words}
+        assert by_stimulus == {"happy": ["P-1", "A-1", "P-2", "A-2"], "angry": ["P-1", "A-1"]}

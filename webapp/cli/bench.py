@@ -28,6 +28,7 @@ from synth.render import Renderer
 from synth.speech.voices import forget_speech
 from synth.text.analysis import guess_language
 from synth.video import VideoWriter
+from webapp.cli.bench_study import study
 from webapp.cli.bench_training import train
 from webapp.cli.context import echo_json
 from webapp.config import Settings
@@ -59,6 +60,7 @@ def bench() -> None:
 
 
 bench.add_command(train)
+bench.add_command(study)
 
 
 @bench.command()

@@ -15,6 +15,7 @@ from webapp.errors import WebappError
 COMMANDS = {
     "assets": "webapp.cli.assets:assets",
     "bench": "webapp.cli.bench:bench",
+    "bots": "webapp.cli.bots:bots",
     "clips": "webapp.cli.clips:clips",
     "db": "webapp.cli.db:db",
     "demo": "webapp.cli.demo:demo",
@@ -27,6 +28,7 @@ COMMANDS = {
     "identities": "webapp.cli.faces:identities",
     "models": "webapp.cli.models:models",
     "report": "webapp.cli.results:report",
+    "rounds": "webapp.cli.rounds:rounds",
     "say": "webapp.cli.say:say",
     "serve": "webapp.cli.serve:serve",
     "study": "webapp.cli.study:study",

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from evaluation.report import html, tables
+from evaluation.report.analysis import StudyReport
 from webapp.cli.context import open_database
 from webapp.errors import ConfigError
 from webapp.services import exports, results
@@ -14,22 +15,31 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 
 @click.command()
 @click.argument("slug")
-@click.option("--out", type=FOLDER, help="Write the report with figures to OUT/report.html as well.")
-def report(slug: str, out: Path | None) -> None:
-    """Print the statistics of the study SLUG: reverse evaluation of PAD, MOS, analysis of variance."""
+@click.option("--part", help="Only this part of the study; left out, all parts, one after the other.")
+@click.option(
+    "--out", type=FOLDER, help="Write each report with figures to OUT/report.html (report-PART.html) as well."
+)
+def report(slug: str, part: str | None, out: Path | None) -> None:
+    """Print the statistics of the study SLUG: evaluated PAD, opinion scores, votes, preferences, screening.
+
+    With --out the report of a study of several parts is one file for each part: OUT/report-PART.html.
+    """
     _, database = open_database()
     with database.read() as session:
-        found = results.report(session, slug)
-    click.echo(tables.to_text(found))
-    if out is None:
-        return
-    path = out / "report.html"
+        found = results.reports(session, slug) if part is None else {part: results.report(session, slug, part)}
+    click.echo("\n".join(tables.to_text(one) for one in found.values()))
+    if out is not None:
+        for name, one in found.items():
+            click.echo(f"Written: {_write(one, out / ('report.html' if len(found) == 1 else f'report-{name}.html'))}")
+
+
+def _write(report: StudyReport, path: Path) -> Path:
     try:
-        out.mkdir(parents=True, exist_ok=True)
-        path.write_text(html.render(found), encoding="utf-8")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(html.render(report), encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"{path} cannot be written ({error.strerror}); name another folder with --out") from error
-    click.echo(f"Written: {path}")
+    return path
 
 
 @click.command()

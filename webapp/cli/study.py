@@ -1,6 +1,7 @@
 """``padlab study``: study files and the studies made of them."""
 
 import dataclasses
+import sys
 from pathlib import Path
 
 import click
@@ -8,9 +9,10 @@ import click
 from evaluation import study as study_file
 from evaluation.study import StudySpec
 from webapp.cli.context import echo_json, open_database
-from webapp.errors import NotFoundError
-from webapp.models import StudyState
-from webapp.services import clips, studies
+from webapp.errors import ConflictError, NotFoundError
+from webapp.models import ParticipantState, StudyState
+from webapp.services import audit, clips, enrolment, studies, withdrawal
+from webapp.services.withdrawal import Extent
 
 FILE = click.Path(path_type=Path)
 
@@ -50,10 +52,10 @@ def study() -> None:
 def validate(file: Path) -> None:
     """Check a study FILE (or the name of a bundled one) without changing anything."""
     spec, text = read_study_file(file)
-    studies.clip_specs(spec, text, source=str(file))
+    _check_contents(spec, text, file)
     click.echo(
-        f"{file} is a valid study file: '{spec.slug}', {len(spec.stimuli)} stimuli in "
-        f"{len(spec.conditions)} conditions, {len(spec.cells())} clips."
+        f"{file} is a valid study file: '{spec.slug}', {_counted(len(spec.stimuli), 'stimulus', 'stimuli')} in "
+        f"{_counted(len(spec.conditions), 'condition', 'conditions')}, {_counted(len(spec.cells()), 'clip', 'clips')}."
     )
 
 
@@ -62,11 +64,26 @@ def validate(file: Path) -> None:
 def apply(file: Path) -> None:
     """Bring a study FILE (or a bundled one) into the database; then render its clips and open it."""
     spec, text = read_study_file(file)
-    studies.clip_specs(spec, text, source=str(file))
+    _check_contents(spec, text, file)
     settings, database = open_database()
     with database.write() as session:
-        slug = studies.apply(session, spec, text, settings).slug
+        slug = studies.apply(session, spec, text, settings, folder=file.parent).slug
     click.echo(f"The study '{slug}' is applied. Next: padlab clips render {slug}; padlab study open {slug}")
+
+
+def on_terminal() -> bool:
+    """Tell whether somebody is there who can be asked."""
+    return sys.stdin.isatty()
+
+
+def _check_contents(spec: StudySpec, text: str, file: Path) -> None:
+    """Refuse a study whose clips cannot be made, or whose media files are not beside it."""
+    studies.clip_specs(spec, text, source=str(file))
+    studies.media_files(spec, text, source=str(file), folder=file.parent)
+
+
+def _counted(count: int, one: str, several: str) -> str:
+    return f"{count} {one if count == 1 else several}"
 
 
 @study.command("list")
@@ -127,6 +144,32 @@ def open_study(slug: str) -> None:
 def close(slug: str) -> None:
     """Let nobody new into the study SLUG; what was collected stays."""
     _set_state(slug, StudyState.CLOSED)
+
+
+@study.command()
+@click.argument("slug")
+@click.argument("participant", type=click.IntRange(min=1))
+@click.option("--erase", is_flag=True, help="Delete all that they gave [default].")
+@click.option("--anonymise", is_flag=True, help="Keep their ratings, without anything that leads to them.")
+@click.option("--yes", is_flag=True, help="Do not ask.")
+def withdraw(slug: str, participant: int, *, erase: bool, anonymise: bool, yes: bool) -> None:
+    """Take PARTICIPANT (their number, from 1) out of the study SLUG; this cannot be taken back."""
+    if erase and anonymise:
+        raise click.UsageError("--erase and --anonymise exclude each other")
+    extent = Extent.ANONYMISE if anonymise else Extent.ERASE
+    _, database = open_database()
+    with database.read() as session:
+        person = enrolment.find_by_number(session, slug, participant - 1)
+        if person.state == ParticipantState.WITHDRAWN:
+            raise ConflictError(f"Participant {participant} of the study '{slug}' has withdrawn already")
+    if not yes and on_terminal():
+        what = "Keep the ratings, but no trace, of" if anonymise else "Delete all answers of"
+        click.confirm(f"{what} participant {participant} of '{slug}'? This cannot be taken back", abort=True)
+    with database.write() as session:
+        person = enrolment.find_by_number(session, slug, participant - 1)
+        withdrawal.withdraw(session, person, extent, actor=audit.COMMAND_LINE)
+    done = "the ratings stay, without a name" if anonymise else "all answers are deleted"
+    click.echo(f"Participant {participant} of the study '{slug}' has withdrawn; {done}.")
 
 
 def _set_state(slug: str, state: StudyState) -> None:

@@ -1,6 +1,7 @@
-"""The experimenter's pages: what was collected so far, and what it says."""
+"""The experimenter's pages: studies, progress, results, downloads, and what is done while a study runs."""
 
+from webapp.experimenter import collection
 from webapp.experimenter.login import login_manager
 from webapp.experimenter.views import blueprint
 
-__all__ = ["blueprint", "login_manager"]
+__all__ = ["blueprint", "collection", "login_manager"]

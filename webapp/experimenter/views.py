@@ -7,20 +7,23 @@ from typing import Any
 from flask import Blueprint, Response, flash, redirect, render_template, request, url_for
 from flask_babel import gettext
 from flask_login import current_user, login_user, logout_user
+from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response as BaseResponse
 
 from evaluation.report import figures, html, tables
 from webapp import locale, security
 from webapp.errors import NotFoundError
 from webapp.experimenter.login import Account, login_manager
-from webapp.models import StudyState
+from webapp.models import Study, StudyState
 from webapp.parts import parts
-from webapp.services import clips, enrolment, experimenters, exports, results, studies
+from webapp.services import clips, enrolment, experimenters, exports, results, rounds, studies
+from webapp.services.rounds import RoundOverview
 
 blueprint = Blueprint("experimenter", __name__, url_prefix="/experimenter")
 
 
-def _page(template: str, **values: Any) -> str:
+def page(template: str, **values: Any) -> str:
+    """Render a page of the experimenter."""
     return render_template(f"experimenter/{template}", languages=list(locale.LOCALES), **values)
 
 
@@ -40,11 +43,11 @@ def login() -> BaseResponse | str | tuple[str, int]:
     if current_user.is_authenticated:
         return redirect(target)
     if request.method == "GET":
-        return _page("login.html", next=target)
+        return page("login.html", next=target)
     with parts().database.read() as db:
         found = experimenters.authenticate(db, request.form.get("name", ""), request.form.get("password", ""))
     if found is None:
-        return _page("login.html", next=target, name=request.form.get("name", ""), failed=True), 401
+        return page("login.html", next=target, name=request.form.get("name", ""), failed=True), 401
     login_user(Account(found))
     return redirect(target, code=303)
 
@@ -60,7 +63,7 @@ def logout() -> BaseResponse:
 def index() -> str:
     """List the studies."""
     with parts().database.read() as db:
-        return _page("index.html", studies=studies.overviews(db))
+        return page("index.html", studies=studies.overviews(db))
 
 
 @blueprint.get("/<slug>/")
@@ -68,18 +71,22 @@ def study(slug: str) -> str:
     """Show what a study has collected and what it says so far."""
     with parts().database.read() as db:
         found = studies.find(db, slug)
-        report = results.report(db, slug)
-        return _page(
+        reports = results.reports(db, slug)
+        return page(
             "study.html",
             study=found,
             progress=clips.progress(db, found),
             failures=clips.failures(db, found),
             participants=enrolment.participants(db, slug),
-            report=report,
-            sections=tables.sections(report),
+            rounds=_rounds(db, found),
+            reports=[(part, tables.title(one), one.trials, tables.sections(one)) for part, one in reports.items()],
             figures=figures.NAMES,
             caption=figures.caption,
         )
+
+
+def _rounds(db: Session, found: Study) -> list[RoundOverview]:
+    return rounds.overview(db, found.slug) if rounds.annotated_parts(studies.spec_of(found)) else []
 
 
 @blueprint.post("/<slug>/state")
@@ -88,7 +95,7 @@ def set_state(slug: str) -> BaseResponse:
     state = StudyState(request.form["state"]) if request.form.get("state") in set(StudyState) else None
     if state is not None:
         with parts().database.write() as db:
-            studies.set_state(db, slug, state)
+            studies.set_state(db, slug, state, actor=current_user.name)
         flash(gettext("The study is open.") if state == StudyState.OPEN else gettext("The study is closed."), "success")
     return redirect(url_for("experimenter.study", slug=slug), code=303)
 
@@ -106,7 +113,7 @@ def figure(slug: str, name: str) -> Response:
     if name not in figures.NAMES:
         raise NotFoundError(name)
     with parts().database.read() as db:
-        svg = figures.draw(name, results.report(db, slug))
+        svg = figures.draw(name, results.report(db, slug, request.args.get("part")))
     response = Response(svg, mimetype="image/svg+xml")
     # Drawings carry their styles inside.
     response.headers["Content-Security-Policy"] = security.REPORT_POLICY
@@ -115,9 +122,9 @@ def figure(slug: str, name: str) -> Response:
 
 @blueprint.get("/<slug>/report.html")
 def report(slug: str) -> Response:
-    """Send the whole report as one file."""
+    """Send the whole report of a part (the first unless one is named) as one file."""
     with parts().database.read() as db:
-        response = Response(html.render(results.report(db, slug)), mimetype="text/html")
+        response = Response(html.render(results.report(db, slug, request.args.get("part"))), mimetype="text/html")
     response.headers["Content-Security-Policy"] = security.REPORT_POLICY
     return response
 

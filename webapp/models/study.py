@@ -2,12 +2,22 @@
 
 from datetime import datetime
 from enum import StrEnum
+from types import MappingProxyType
 
-from sqlalchemy import ForeignKey, String, Text, UniqueConstraint
+from sqlalchemy import JSON, ForeignKey, String, Text, UniqueConstraint
 from sqlalchemy.orm import Mapped, mapped_column, relationship
 
 from webapp.db import Base
 from webapp.models.columns import Digest, Document, Key, Moment, Name, UtcDateTime, now
+
+MEDIA = MappingProxyType(
+    {
+        **dict.fromkeys(("mp4", "webm"), "video"),
+        **dict.fromkeys(("wav", "mp3", "ogg", "m4a"), "audio"),
+        **dict.fromkeys(("png", "jpg", "jpeg", "webp", "gif"), "image"),
+    }
+)
+"""What each kind of file is, by its suffix; others are not taken."""
 
 
 class StudyState(StrEnum):
@@ -28,7 +38,10 @@ class ClipStatus(StrEnum):
 
 
 class Study(Base):
-    """A study file as applied: its text is kept, so that what was collected can always be read with it."""
+    """A study file as applied: its text is kept, so that what was collected can always be read with it.
+
+    `enrolled` counts those who ever enrolled, `next_slot` the places of the design that were given out.
+    """
 
     __tablename__ = "study"
 
@@ -39,6 +52,8 @@ class Study(Base):
     text: Mapped[str] = mapped_column(Text())
     digest: Mapped[Digest]
     applied_at: Mapped[Moment] = mapped_column(default=now)
+    enrolled: Mapped[int] = mapped_column(default=0)
+    next_slot: Mapped[int] = mapped_column(default=0)
 
     conditions: Mapped[list["Condition"]] = relationship(
         back_populates="study", order_by="Condition.position", cascade="all, delete-orphan"
@@ -63,7 +78,11 @@ class Condition(Base):
 
 
 class Clip(Base):
-    """A clip by its identity: the digest of specification, models, face data and renderer version."""
+    """A clip by its identity: the digest of specification, models, face data and renderer version.
+
+    A file of the experimenter's own is a clip too: its identity is the digest of its bytes, and its `spec` says from
+    which file it came. `suffix` is that of the file in the media store.
+    """
 
     __tablename__ = "clip"
 
@@ -73,13 +92,28 @@ class Clip(Base):
     status: Mapped[str] = mapped_column(String(10), default=ClipStatus.PENDING, index=True)
     error: Mapped[str | None] = mapped_column(Text())
     bytes: Mapped[int | None]
+    suffix: Mapped[str] = mapped_column(String(5), default="mp4")
+    duration_s: Mapped[float | None]
     created_at: Mapped[Moment] = mapped_column(default=now)
     claimed_at: Mapped[datetime | None] = mapped_column(UtcDateTime())
     finished_at: Mapped[datetime | None] = mapped_column(UtcDateTime())
 
+    @property
+    def medium(self) -> str:
+        """What shows it: "video", "audio" or "image"."""
+        return MEDIA[self.suffix]
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it has no beginning and no end."""
+        return self.medium == "image"
+
 
 class Stimulus(Base):
-    """What a trial shows: one item of the study file in one condition, and the clip made for it."""
+    """What a trial shows: one item of the study file in one condition, and the clip made for it.
+
+    `words` are the prosodic words of its sentence, where the study asks about them.
+    """
 
     __tablename__ = "stimulus"
     __table_args__ = (UniqueConstraint("study_id", "name", "condition_id"),)
@@ -89,6 +123,7 @@ class Stimulus(Base):
     name: Mapped[Name]
     condition_id: Mapped[int] = mapped_column(ForeignKey("condition.id", ondelete="CASCADE"), index=True)
     clip_id: Mapped[int] = mapped_column(ForeignKey("clip.id"), index=True)
+    words: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True))
 
     study: Mapped[Study] = relationship(back_populates="stimuli")
     condition: Mapped[Condition] = relationship()

@@ -1,5 +1,7 @@
 """Who is at the other end: a long-lived cookie names the participant, a session cookie the sitting."""
 
+from collections.abc import Mapping
+
 from flask import request, session
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response
@@ -8,6 +10,7 @@ from webapp.errors import NotFoundError
 from webapp.models import Participant
 from webapp.parts import parts
 from webapp.services import enrolment
+from webapp.services.enrolment import Panel
 
 COOKIE_SECONDS = 180 * 24 * 3600
 
@@ -26,7 +29,8 @@ def remember(response: Response, slug: str, token: str) -> Response:
 
 def forget(response: Response, slug: str) -> Response:
     """Let the browser forget the participant."""
-    session.pop(f"enrol_{slug}", None)
+    for key in ("enrol", "panel", "part", "feedback"):
+        session.pop(f"{key}_{slug}", None)
     response.delete_cookie(_cookie(slug), path="/")
     return response
 
@@ -37,6 +41,19 @@ def expect(slug: str) -> str:
     if key not in session:
         session[key] = enrolment.new_token()
     return str(session[key])
+
+
+def note_panel(slug: str, parameters: Mapping[str, str]) -> None:
+    """Remember whom a panel says that this is, until they enrol."""
+    found = enrolment.panel_of(parameters)
+    if found is not None:
+        session[f"panel_{slug}"] = list(found)
+
+
+def panel(slug: str) -> Panel | None:
+    """Return whom a panel said that this is."""
+    found = session.get(f"panel_{slug}")
+    return Panel(*found) if found else None
 
 
 def find(db: Session, slug: str) -> Participant | None:

@@ -1,37 +1,38 @@
 """The participant's pages. Each view parses, calls a service, answers."""
 
-import json
 from typing import Any
 
-from flask import Blueprint, redirect, render_template, request, url_for
+from flask import Blueprint, redirect, render_template, request, session, url_for
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response
 
-from evaluation import instruments
 from evaluation.study import StudySpec
 from webapp import locale
-from webapp.models import ClipStatus, Participant, Study, StudyState, Trial
+from webapp.models import Participant, Study, StudyState
+from webapp.models.columns import now
 from webapp.participant import identity
 from webapp.parts import parts
-from webapp.services import clips, enrolment, studies, trials
-from webapp.services.trials import AnswersRefusedError, Playback
+from webapp.services import enrolment, studies, trials, withdrawal
+from webapp.services.withdrawal import Extent
 
 blueprint = Blueprint("participant", __name__)
-MAX_PLAYBACK_LENGTH = 20_000
 
 
-def _go(endpoint: str, slug: str, **values: Any) -> Response:
+def go(endpoint: str, slug: str, **values: Any) -> Response:
+    """Lead on to a page of a study."""
     # 303: whatever came in, the next page is fetched with GET.
     return redirect(url_for(f"participant.{endpoint}", slug=slug, **values), code=303)
 
 
-def _language(spec: StudySpec) -> str:
+def language_of(spec: StudySpec) -> str:
+    """Return the language of a study's pages: the person's if the study has it, else the study's first."""
     wanted = locale.language()
     return wanted if wanted in spec.languages else spec.languages[0]
 
 
-def _study_page(template: str, spec: StudySpec, study: Study, **values: Any) -> str:
-    language = _language(spec)
+def study_page(template: str, spec: StudySpec, study: Study, **values: Any) -> str:
+    """Render a page of a study."""
+    language = language_of(spec)
     return render_template(
         f"participant/{template}",
         spec=spec,
@@ -48,7 +49,7 @@ def _study_page(template: str, spec: StudySpec, study: Study, **values: Any) -> 
 def home() -> str:
     """List the studies that are open."""
     with parts().database.read() as db:
-        found = [(spec.slug, spec.title[_language(spec)]) for spec in studies.open_specs(db)]
+        found = [(spec.slug, spec.title[language_of(spec)]) for spec in studies.open_specs(db)]
     return render_template("participant/home.html", studies=found, languages=list(locale.LOCALES))
 
 
@@ -59,31 +60,38 @@ def welcome(slug: str) -> Response | str:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is not None:
-            return _go("trial" if participant.completed_at is None else "debrief", slug)
+            return go("trial" if participant.completed_at is None else "debrief", slug)
         identity.expect(slug)
-        return _study_page("welcome.html", studies.spec_of(study), study, open=study.state == StudyState.OPEN)
+        identity.note_panel(slug, request.args)
+        return study_page("welcome.html", studies.spec_of(study), study, open=study.state == StudyState.OPEN)
 
 
 @blueprint.post("/s/<slug>/consent")
-def consent(slug: str) -> Response | str:
+def consent(slug: str) -> Response | str | tuple[str, int]:
     """Enrol the person who agreed."""
     with parts().database.read() as db:
         study = studies.find(db, slug)
         spec = studies.spec_of(study)
         if identity.find(db, slug) is not None:
-            return _go("instructions", slug)
+            return go("instructions", slug)
+        opened = study.state == StudyState.OPEN
         if request.form.get("consent") != "yes":
-            return _study_page("welcome.html", spec, study, open=study.state == StudyState.OPEN, problem="consent")
-    with parts().database.write() as db:
-        participant = enrolment.enrol(db, slug, language=_language(spec), token=identity.expect(slug))
-    return identity.remember(_go("instructions", slug), slug, participant.token)
+            return study_page("welcome.html", spec, study, open=opened, problem="consent")
+    try:
+        with parts().database.write() as db:
+            participant = enrolment.enrol(
+                db, slug, language=language_of(spec), token=identity.expect(slug), panel=identity.panel(slug)
+            )
+    except enrolment.FullError:
+        return study_page("full.html", spec, study), 409
+    return identity.remember(go("instructions", slug), slug, participant.token)
 
 
 @blueprint.get("/s/<slug>/consent")
 @blueprint.get("/s/<slug>/trial/<int(max=100000):position>")
 def again(slug: str, position: int = 0) -> Response:
     """Lead an address that only takes forms (loaded again, or after a change of language) to the page it belongs to."""
-    return _go("welcome", slug)
+    return go("welcome", slug)
 
 
 @blueprint.post("/s/<slug>/leave")
@@ -91,7 +99,7 @@ def leave(slug: str) -> Response:
     """Forget who sits at this browser, so that somebody else can begin; answers stay."""
     with parts().database.read() as db:
         studies.find(db, slug)
-    return identity.forget(_go("welcome", slug), slug)
+    return identity.forget(go("welcome", slug), slug)
 
 
 @blueprint.get("/s/<slug>/resume/<token>")
@@ -99,133 +107,110 @@ def resume(slug: str, token: str) -> Response:
     """Go on with a personal link, in this or another browser."""
     with parts().database.read() as db:
         participant = enrolment.find(db, slug, token)
-        response = _go("trial" if participant.completed_at is None else "debrief", slug)
+        response = go("trial" if participant.completed_at is None else "debrief", slug)
         return identity.remember(response, slug, participant.token)
 
 
 @blueprint.get("/s/<slug>/instructions")
 def instructions(slug: str) -> Response | str:
-    """Explain the task."""
+    """Explain the task of the part that comes next."""
     with parts().database.read() as db:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is None:
-            return _go("welcome", slug)
+            return go("welcome", slug)
         spec = studies.spec_of(study)
+        current = trials.current(db, participant)
+        if current is None:
+            return go("trial", slug)
+        part = spec.part(current.part)
+        session[f"part_{slug}"] = part.name
         link = url_for("participant.resume", slug=slug, token=participant.token, _external=True)
-        return _study_page(
+        return study_page(
             "instructions.html",
             spec,
             study,
+            part=part,
+            part_number=spec.all_parts.index(part) + 1,
+            paragraphs_of_part=(part.instructions or spec.instructions)[language_of(spec)],
+            watched=part.watched,
             personal_link=link,
-            trial_count=trials.count(db, participant),
+            trial_count=trials.remaining(db, participant, part.name),
         )
 
 
-@blueprint.get("/s/<slug>/trial")
-def trial(slug: str) -> Response | str:
-    """Show the first trial without an answer."""
+def not_now(db: Session, participant: Participant, spec: StudySpec, study: Study) -> str | None:
+    """Return the page that says why there is nothing to do now; None if there is."""
+    if participant.opens_at is not None and participant.opens_at > now():
+        part = spec.all_parts[participant.part]
+        link = url_for("participant.resume", slug=study.slug, token=participant.token, _external=True)
+        return study_page("later.html", spec, study, opens_at=participant.opens_at, part=part, personal_link=link)
+    if trials.current(db, participant) is None:
+        return study_page("between_rounds.html", spec, study)
+    return None
+
+
+@blueprint.get("/s/<slug>/withdraw")
+def ask_to_withdraw(slug: str) -> Response | str:
+    """Ask what is to become of the answers."""
     with parts().database.read() as db:
+        study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is None:
-            return _go("welcome", slug)
-        identity.visit_id(participant)
-        current = trials.current(db, participant)
-        if current is None:
-            return _go("debrief", slug)
-        page = _trial_page(db, participant, current)
-    if current.shown_at is None and current.stimulus.clip.status == ClipStatus.DONE:
-        with parts().database.write() as db:
-            trials.mark_shown(db, current.id)
-    return page
+            return go("welcome", slug)
+        return study_page("withdraw.html", studies.spec_of(study), study, answered=trials.answered(db, participant))
 
 
-def _trial_page(
-    db: Session,
-    participant: Participant,
-    current: Trial,
-    *,
-    given: dict[str, str] | None = None,
-    problems: dict[str, str] | None = None,
-) -> str:
-    study = participant.study
-    spec = studies.spec_of(study)
-    clip = current.stimulus.clip
-    if clip.status != ClipStatus.DONE:
-        failed = clip.status == ClipStatus.FAILED
-        return _study_page("waiting.html", spec, study, failed=failed, clip_progress=clips.progress(db, study))
-    return _study_page(
-        "trial.html",
-        spec,
-        study,
-        trial=current,
-        total=trials.count(db, participant),
-        clip=clip,
-        width=clip.spec["width"],
-        height=clip.spec["height"],
-        instruments=[instruments.get(name) for name in spec.instruments],
-        field_name=trials.field_name,
-        given=given or {},
-        problems=problems or {},
-    )
-
-
-@blueprint.post("/s/<slug>/trial/<int(max=100000):position>")
-def answer(slug: str, position: int) -> Response | tuple[str, int]:
-    """Store a trial's answers; the next trial is shown only when they are on disk."""
+@blueprint.post("/s/<slug>/withdraw")
+def withdraw(slug: str) -> Response | str:
+    """Take the participant out of the study."""
     with parts().database.read() as db:
+        study = studies.find(db, slug)
+        spec = studies.spec_of(study)
         participant = identity.find(db, slug)
         if participant is None:
-            return _go("welcome", slug)
-        spec = studies.spec_of(participant.study)
-    visit = identity.visit_id(participant)
-    try:
-        answers = trials.validate(spec, request.form)
-    except AnswersRefusedError as refused:
-        return _answer_again(slug, position, refused.problems)
+            return go("welcome", slug)
+        if request.form.get("extent") not in set(Extent):
+            answered = trials.answered(db, participant)
+            return study_page("withdraw.html", spec, study, answered=answered, problem="extent")
+    extent = Extent(request.form["extent"])
     with parts().database.write() as db:
-        following = trials.record(
-            db,
-            participant,
-            position,
-            answers,
-            visit_id=visit,
-            playback=_playback(request.form.get("playback", "")),
-        )
-    return _go("debrief" if following is None else "trial", slug)
+        withdrawal.withdraw(db, participant, extent, actor="participant")
+    return identity.forget(go("withdrawn", slug, extent=extent.value), slug)
 
 
-def _answer_again(slug: str, position: int, problems: dict[str, str]) -> Response | tuple[str, int]:
+@blueprint.get("/s/<slug>/withdrawn")
+def withdrawn(slug: str) -> str:
+    """Confirm a withdrawal."""
     with parts().database.read() as db:
-        participant = identity.find(db, slug)
-        current = trials.current(db, participant) if participant else None
-        if participant is None or current is None or current.position != position:
-            return _go("trial", slug)
-        given = {name: value for name, value in request.form.items() if "." in name}
-        return _trial_page(db, participant, current, given=given, problems=problems), 422
-
-
-def _playback(text: str) -> list[Playback]:
-    """Read the page's log of the video element; a log that makes no sense is dropped, the answers are not."""
-    try:
-        events = json.loads(text[:MAX_PLAYBACK_LENGTH] or "[]")
-        return [
-            Playback(str(kind), int(page_ms), float(media_s))
-            for kind, page_ms, media_s in events[: trials.MAX_PLAYBACK_EVENTS]
-            if kind in trials.PLAYBACK_KINDS and 0 <= page_ms < 2**31 and 0 <= media_s < 1e6
-        ]
-    except (ValueError, TypeError, OverflowError, RecursionError):
-        return []
+        study = studies.find(db, slug)
+        erased = request.args.get("extent") == Extent.ERASE
+        return study_page("withdrawn.html", studies.spec_of(study), study, erased=erased)
 
 
 @blueprint.get("/s/<slug>/debrief")
 def debrief(slug: str) -> Response | str:
-    """Thank, and say what it was about."""
+    """Thank, say what it was about, and give what the panel asks for."""
     with parts().database.read() as db:
         study = studies.find(db, slug)
         participant = identity.find(db, slug)
         if participant is None:
-            return _go("welcome", slug)
+            return go("welcome", slug)
         if participant.completed_at is None:
-            return _go("trial", slug)
-        return _study_page("debrief.html", studies.spec_of(study), study, number=participant.number + 1)
+            return go("trial", slug)
+        spec = studies.spec_of(study)
+        return study_page(
+            "debrief.html",
+            spec,
+            study,
+            number=participant.number + 1,
+            code=participant.code,
+            back_to_panel=_back_to_panel(spec, participant),
+        )
+
+
+def _back_to_panel(spec: StudySpec, participant: Participant) -> str | None:
+    if spec.completion.redirect is None:
+        return None
+    filled = spec.completion.redirect.replace("{code}", participant.code or "")
+    return filled.replace("{panel_id}", participant.panel_id or "")

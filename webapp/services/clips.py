@@ -127,12 +127,12 @@ def _update(session: Session, digests: Iterable[str], was: ClipStatus, **values:
         session.execute(update(Clip).where(Clip.digest == digest, Clip.status == was).values(**values))
 
 
-def mark_done(session: Session, digest: str, size: int) -> None:
-    """Record that a clip is in the media store, with its size in bytes."""
+def mark_done(session: Session, digest: str, size: int, duration_s: float | None = None) -> None:
+    """Record that a clip is in the media store, with its size in bytes and its length in seconds."""
     session.execute(
         update(Clip)
         .where(Clip.digest == digest)
-        .values(status=ClipStatus.DONE, bytes=size, error=None, finished_at=now())
+        .values(status=ClipStatus.DONE, bytes=size, duration_s=duration_s, error=None, finished_at=now())
     )
 
 
@@ -145,6 +145,7 @@ def mark_failed(session: Session, digest: str, error: str) -> None:
     )
 
 
-def done(session: Session) -> list[str]:
-    """List the digests of all clips that are recorded as done."""
-    return list(session.scalars(select(Clip.digest).where(Clip.status == ClipStatus.DONE)))
+def done(session: Session) -> list[tuple[str, str]]:
+    """List digest and suffix of all clips that are recorded as done."""
+    found = select(Clip.digest, Clip.suffix).where(Clip.status == ClipStatus.DONE)
+    return [(digest, suffix) for digest, suffix in session.execute(found)]

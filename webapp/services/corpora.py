@@ -2,9 +2,10 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -12,10 +13,11 @@ from numpy.typing import NDArray
 from sqlalchemy.orm import Session
 
 from evaluation.errors import EvaluationError
-from evaluation.responses import DIMENSIONS, check_responses, score_trials
+from evaluation.responses import DIMENSIONS, check_responses, pad_instruments, score_trials
 from evaluation.seeding import generator
 from evaluation.simulate import annotate_incrementally
 from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
+from evaluation.study import Part, StudySpec
 from synth.clip import clip_digest
 from synth.clip_spec import ClipSpec
 from synth.corpus.expressions import ExpressionSet
@@ -31,8 +33,8 @@ from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
 from webapp.media import MediaStore
-from webapp.models import Clip
-from webapp.services import results, studies
+from webapp.models import Clip, Study
+from webapp.services import results, rounds, studies
 
 Floats = NDArray[np.float64]
 
@@ -156,53 +158,90 @@ def of_study(session: Session, slug: str, settings: Settings) -> Samples:
     """Return the faces that a study shows, with the mean PAD that its participants gave each (MTAP 2013, Eq. 13).
 
     The FAPs are those that were shown, at the apex. Faces of equal PEPs (a word in two conditions, say) stay apart, as
-    they were rated apart.
+    they were rated apart. The PAD is that of the first part that asks for it, with whatever instrument; of a part that
+    is annotated in rounds, it is what the annotation has come to.
 
     Raises
     ------
     NotFoundError
         If there is no such study.
     ConflictError
-        If it does not ask the 12-item PAD questionnaire, no face has been rated, or it is no longer known which FAPs
-        were shown.
+        If it asks no questionnaire that gives PAD, no face has been rated, or it is no longer known which FAPs were
+        shown.
     """
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
-    if "pad12" not in spec.instruments:
-        raise ConflictError(f"The study '{slug}' does not ask pad12, so it holds no PAD to learn from")
-    scores = score_trials(spec, check_responses(spec, results.responses(session, slug)))
-    answered = scores.dropna(subset=list(DIMENSIONS))
-    by_cell = answered.groupby(["stimulus", "condition"])[list(DIMENSIONS)].mean()
-    means = dict(zip(by_cell.index, by_cell.to_numpy(dtype=np.float64), strict=True))
+    part = next((part for part in spec.all_parts if pad_instruments(spec.only(part.name))), None)
+    if part is None:
+        raise ConflictError(f"The study '{slug}' does not ask pad12, pad5 or sam, so it holds no PAD to learn from")
+    rated = _annotated(session, study, spec, part) if part.annotation else _scored(session, spec, part)
     clips = {(stimulus.name, stimulus.condition.name): stimulus.clip for stimulus in study.stimuli}
-    rated = [cell for cell in clips if cell in means]
-    if not rated:
+    cells = [cell for cell in clips if cell in rated.means]
+    if not cells:
         raise ConflictError(f"The study '{slug}' has no rated face yet; train when participants have answered")
     store = MediaStore(settings.media_url)
-    faps = np.array([_apex(clips[cell], store, settings) for cell in rated])
-    pad = np.array([means[cell] for cell in rated])
+    faps = np.array([_apex(clips[cell], store, settings) for cell in cells])
+    pad = np.array([rated.means[cell] for cell in cells])
     return Samples(
         name=f"{STUDY_PREFIX}{slug}",
         faps=faps,
         pad=pad,
-        emotions=tuple(stimulus for stimulus, _ in rated),
-        note=f"PAD of {len(rated)} faces, mean over {answered['participant'].nunique()} raters in the study {slug}.",
-        digest=_digest(rated, faps, pad),
-        reliability=_reliability(answered),
+        emotions=tuple(stimulus for stimulus, _ in cells),
+        note=f"PAD of {len(cells)} faces, mean over {rated.raters} raters in the study {slug}.",
+        digest=_digest(cells, faps, pad),
+        reliability=rated.reliability,
     )
+
+
+class _Rated(NamedTuple):
+    """Mean PAD (3,) of each cell that was rated, by how many, and how reliable that is, if it can be told."""
+
+    means: Mapping[tuple[str, str], Floats]
+    raters: int
+    reliability: Floats | None
+
+
+def _scored(session: Session, spec: StudySpec, part: Part) -> _Rated:
+    """Return what the answers to a part's questionnaires come to."""
+    scores = score_trials(spec, check_responses(spec, results.responses(session, spec.slug, part.name)))
+    answered = scores.dropna(subset=list(DIMENSIONS))
+    by_cell = answered.groupby(["stimulus", "condition"])[list(DIMENSIONS)].mean()
+    means = dict(zip(by_cell.index, by_cell.to_numpy(dtype=np.float64), strict=True))
+    return _Rated(means, int(answered["participant"].nunique()), _reliability(answered))
+
+
+def _annotated(session: Session, study: Study, spec: StudySpec, part: Part) -> _Rated:
+    """Return what the rounds of a part have come to: means over rounds, then over raters."""
+    found = rounds.annotated(session, study, spec, part)
+    if found is None or not len(found.values):
+        return _Rated({}, 0, None)
+    columns = [found.dimensions.index(dimension) for dimension in DIMENSIONS]
+    cells = {stimulus.id: (stimulus.name, stimulus.condition.name) for stimulus in study.stimuli}
+    means = {
+        cells[key]: values[columns]
+        for (key, _), values in zip(found.stimuli, found.values, strict=True)
+        if not np.isnan(values[columns]).any()
+    }
+    count = len(found.raters) or (part.annotation.raters if part.annotation else 0)
+    return _Rated(means, count, _agreed(found.ratings[:, :, columns]) if found.raters else None)
+
+
+def _agreed(ratings: Floats) -> Floats | None:
+    try:
+        return reliability(annotation_agreement(ratings))
+    except EvaluationError:
+        return None
 
 
 def _reliability(scores: pd.DataFrame) -> Floats | None:
     """Return the reliability of the mean ratings, or None where not everybody has rated every face."""
     by_rater = [
-        scores.pivot(index=["stimulus", "condition"], columns="participant", values=name).to_numpy(dtype=np.float64)
+        scores.pivot_table(
+            index=["stimulus", "condition"], columns="participant", values=name, aggfunc="mean", dropna=False
+        ).to_numpy(dtype=np.float64)
         for name in DIMENSIONS
     ]
-    ratings = np.stack(by_rater, axis=2)
-    try:
-        return reliability(annotation_agreement(ratings))
-    except EvaluationError:
-        return None
+    return _agreed(np.stack(by_rater, axis=2))
 
 
 def _apex(clip: Clip, store: MediaStore, settings: Settings) -> Floats:

@@ -1,66 +1,101 @@
-"""What was collected, as the frames that the statistics take."""
+"""What was collected, as the frames that the statistics take, and what they say of it."""
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import pandas as pd
-from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from evaluation.report.analysis import RESPONSE_COLUMNS, StudyReport, analyse
-from webapp.models import Condition, Participant, PlaybackEvent, Response, Stimulus, Trial
-from webapp.services import studies
+from evaluation.report.analysis import StudyReport, analyse
+from evaluation.study import StudySpec
+from webapp.errors import NotFoundError
+from webapp.services import collected, studies
+from webapp.services.collected import ANSWER_COLUMNS, TRIAL_COLUMNS, answers, trials
+from webapp.services.counting import PREFERENCE_COLUMNS, preferences_frame, statistics_frame
+from webapp.services.raters import CHECK_COLUMNS, REPEAT_COLUMNS, TIMING_COLUMNS, checks, repeats, screening, timing
 
-TRIAL_COLUMNS = {
-    "participant": "number of the participant, counted from 1 in the order of enrolment",
-    "trial": "place of the trial in the participant's order, counted from 1",
-    "stimulus": "what was shown",
-    "condition": "in which condition",
-    "clip": "sha-256 of all that made the clip; leads to its lineage in the media store",
-    "language": "language of the pages",
-    "consented_at": "when the participant agreed (UTC)",
-    "shown_at": "when the trial was first on the screen (UTC); empty if not yet",
-    "answered_at": "when its answers were stored (UTC); empty if not yet",
-    "plays": "how often the clip was played to its end",
-}
-"""The columns of `trials` and what they mean."""
+__all__ = [
+    "ANSWER_COLUMNS",
+    "CHECK_COLUMNS",
+    "PREFERENCE_COLUMNS",
+    "REPEAT_COLUMNS",
+    "TIMING_COLUMNS",
+    "TRIAL_COLUMNS",
+    "answers",
+    "checks",
+    "preferences",
+    "repeats",
+    "report",
+    "reports",
+    "responses",
+    "screening",
+    "timing",
+    "trials",
+]
 
 
-def responses(session: Session, slug: str) -> pd.DataFrame:
-    """Return all counting answers of a study, one row for each item (the last revision of each).
+def responses(session: Session, slug: str, part: str | None = None) -> pd.DataFrame:
+    """Return what the statistics take: whole-number answers about single clips, of trials that count.
+
+    Parameters
+    ----------
+    part : str, optional
+        Name of the part; left out, all parts.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each item, with the columns `evaluation.responses.RESPONSE_COLUMNS` and `OPTIONAL_COLUMNS`.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such study or part.
+    """
+    study = studies.find(session, slug)
+    spec = studies.spec_of(study)
+    if part is not None:
+        _require(spec, part)
+    return statistics_frame(spec, collected.read(session, study), part)
+
+
+def preferences(session: Session, slug: str, part: str | None = None) -> pd.DataFrame:
+    """Return which of two clips was preferred in each trial that counts and asked so.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The columns `PREFERENCE_COLUMNS`: the conditions of the first and second clip of the page, and the preferred.
 
     Raises
     ------
     NotFoundError
         If there is no such study.
     """
-    study = studies.find(session, slug)
-    rows = session.execute(
-        select(
-            Participant.number,
-            Trial.position,
-            Stimulus.name,
-            Condition.name,
-            Response.instrument,
-            Response.answers,
-        )
-        .select_from(Response)
-        .join(Trial, Response.trial_id == Trial.id)
-        .join(Participant, Trial.participant_id == Participant.id)
-        .join(Stimulus, Trial.stimulus_id == Stimulus.id)
-        .join(Condition, Stimulus.condition_id == Condition.id)
-        .where(Participant.study_id == study.id)
-        .order_by(Participant.number, Trial.position, Response.revision, Response.id)
-    )
-    # Later revisions come later and replace the earlier ones.
-    counting = {(row[0], row[1], row[4]): row for row in rows}
-    records = [
-        (number + 1, position, stimulus, condition, instrument, item, value)
-        for number, position, stimulus, condition, instrument, answers in counting.values()
-        for item, value in answers.items()
-    ]
-    return pd.DataFrame.from_records(records, columns=list(RESPONSE_COLUMNS))
+    return preferences_frame(collected.read(session, studies.find(session, slug)), part)
 
 
-def report(session: Session, slug: str) -> StudyReport:
-    """Analyse what a study has collected so far.
+def report(session: Session, slug: str, part: str | None = None) -> StudyReport:
+    """Analyse what a part of a study has collected so far.
+
+    Parameters
+    ----------
+    part : str, optional
+        Name of the part; left out, the first, which is the only one of a study without parts.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such study or part.
+    """
+    spec = studies.spec_of(studies.find(session, slug))
+    name = spec.all_parts[0].name if part is None else part
+    _require(spec, name)
+    return _reports(session, slug, [name])[name]
+
+
+def reports(session: Session, slug: str) -> dict[str, StudyReport]:
+    """Analyse what each part of a study has collected so far, by the part's name in the order of the study file.
 
     Raises
     ------
@@ -68,42 +103,28 @@ def report(session: Session, slug: str) -> StudyReport:
         If there is no such study.
     """
     spec = studies.spec_of(studies.find(session, slug))
-    return analyse(spec, responses(session, slug))
+    return _reports(session, slug, [part.name for part in spec.all_parts])
 
 
-def trials(session: Session, slug: str) -> pd.DataFrame:
-    """Return one row for each trial: what was shown, when, and how often the clip was played to its end."""
+def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, StudyReport]:
     study = studies.find(session, slug)
-    ended = (
-        select(PlaybackEvent.trial_id)
-        .where(PlaybackEvent.kind == "ended")
-        .join(Trial, Trial.id == PlaybackEvent.trial_id)
-        .join(Participant, Participant.id == Trial.participant_id)
-        .where(Participant.study_id == study.id)
-    )
-    plays = pd.Series(list(session.scalars(ended)), dtype="int64").value_counts()
-    rows = session.execute(
-        select(Trial, Participant, Stimulus)
-        .join(Participant, Trial.participant_id == Participant.id)
-        .join(Stimulus, Trial.stimulus_id == Stimulus.id)
-        .where(Participant.study_id == study.id)
-        .order_by(Participant.number, Trial.position)
-    )
-    return pd.DataFrame(
-        [
-            {
-                "participant": participant.number + 1,
-                "trial": trial.position,
-                "stimulus": stimulus.name,
-                "condition": stimulus.condition.name,
-                "clip": stimulus.clip.digest,
-                "language": participant.language,
-                "consented_at": participant.consented_at,
-                "shown_at": trial.shown_at,
-                "answered_at": trial.answered_at,
-                "plays": int(plays.get(trial.id, 0)),
-            }
-            for trial, participant, stimulus in rows
-        ],
-        columns=list(TRIAL_COLUMNS),
-    )
+    spec = studies.spec_of(study)
+    rows = collected.read(session, study)
+    found = {}
+    for name in parts:
+        again = spec.part(name).repeats is not None
+        made = analyse(
+            spec if spec.parts is None else spec.only(name),
+            statistics_frame(spec, rows, name),
+            preferences=preferences_frame(rows, name),
+            repeats=repeats(session, slug, name) if again else None,
+            screening=screening(session, slug, name),
+        )
+        found[name] = replace(made, study=spec)
+    return found
+
+
+def _require(spec: StudySpec, part: str) -> None:
+    names = [one.name for one in spec.all_parts]
+    if part not in names:
+        raise NotFoundError(f"The study '{spec.slug}' has no part '{part}'; there are: {', '.join(names)}")

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
@@ -12,9 +14,14 @@ from evaluation.study import Cell, StudySpec
 from synth.clip import clip_digest
 from synth.clip_spec import ClipSpec
 from synth.errors import SpecError
+from synth.text.analysis import analyse
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError
-from webapp.models import Clip, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
+from webapp.media import CLIP, MediaStore
+from webapp.models import Clip, ClipStatus, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
+from webapp.models.columns import now
+from webapp.models.study import MEDIA
+from webapp.services import audit
 
 
 @dataclass(frozen=True)
@@ -29,31 +36,36 @@ class StudyOverview:
     responses: int
 
 
-def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> Study:
+def apply(session: Session, spec: StudySpec, text: str, settings: Settings, *, folder: Path | None = None) -> Study:
     """Bring a study file into the database and register its clips for rendering.
 
     Applying the same file again changes nothing. A study that has participants cannot be changed any more: what was
     collected must stay readable with the file it was collected with.
+
+    Parameters
+    ----------
+    folder : Path, optional
+        Where the study file lies, and its media files beside it.
 
     Raises
     ------
     ConflictError
         If the file differs from the applied one and participants have enrolled.
     StudyFileError
-        If a clip of the file cannot be made.
+        If a clip of the file cannot be made, or a media file is not there.
     """
-    study = session.scalar(select(Study).where(Study.slug == spec.slug).with_for_update())
-    if study is not None and _enrolled(session, study):
+    query = select(Study).where(Study.slug == spec.slug)
+    study = session.scalar(query.with_for_update().execution_options(populate_existing=True))
+    if study is not None and study.enrolled:
         if study.digest == spec.digest:
             return study
         raise ConflictError(
             f"The study '{spec.slug}' has participants and cannot be changed; give the changed file a new slug"
         )
-    wanted = clip_specs(spec, text, source=spec.slug)
-    digests = {cell: clip_digest(clip, settings.face_dir, settings.models_dir) for cell, clip in wanted.items()}
+    wanted = _contents(spec, text, settings, folder)
     if study is not None and study.digest == spec.digest:
         applied = [stimulus.clip.digest for stimulus in study.stimuli]
-        if applied == list(digests.values()):
+        if applied == [content.digest for content in wanted.values()]:
             return study
     if study is None:
         study = Study(slug=spec.slug)
@@ -66,16 +78,94 @@ def apply(session: Session, spec: StudySpec, text: str, settings: Settings) -> S
     session.flush()
     study.conditions = [Condition(name=condition.name, position=k) for k, condition in enumerate(spec.conditions)]
     by_name = {condition.name: condition for condition in study.conditions}
-    for cell, clip in wanted.items():
+    words = _words(spec)
+    for cell, content in wanted.items():
         study.stimuli.append(
-            Stimulus(name=cell.stimulus, condition=by_name[cell.condition], clip=_clip(session, clip, digests[cell]))
+            Stimulus(
+                name=cell.stimulus,
+                condition=by_name[cell.condition],
+                clip=_clip(session, content),
+                words=words.get(cell.stimulus),
+            )
         )
     session.flush()
+    audit.note(session, study, audit.COMMAND_LINE, "apply", digest=spec.digest)
     return study
 
 
+@dataclass(frozen=True)
+class _Content:
+    """What a cell shows: a clip to be made, or a file that is there."""
+
+    digest: str
+    spec: dict[str, Any]
+    suffix: str = CLIP
+    bytes: int | None = None
+
+
+def _contents(spec: StudySpec, text: str, settings: Settings, folder: Path | None) -> dict[Cell, _Content]:
+    made = clip_specs(spec, text, source=spec.slug)
+    files = media_files(spec, text, source=spec.slug, folder=folder)
+    found = {
+        cell: _Content(clip_digest(clip, settings.face_dir, settings.models_dir), clip.to_dict())
+        for cell, clip in made.items()
+    }
+    store = MediaStore(settings.media_url) if files else None
+    for cell, path in files.items():
+        digest = store.add_file(path) if store is not None else ""
+        suffix = path.suffix.lower().removeprefix(".")
+        found[cell] = _Content(digest, {"file": path.name}, suffix, path.stat().st_size)
+    return {cell: found[cell] for cell in spec.cells()}
+
+
+def _words(spec: StudySpec) -> dict[str, list[str]]:
+    """Return the prosodic words of each stimulus, if the study asks about them."""
+    if not any(spec.instrument(name).per == "word" for name in spec.instrument_names):
+        return {}
+    found = {}
+    for stimulus in spec.stimuli:
+        language, text = str(stimulus.clip.get("lang", "en")), str(stimulus.clip.get("text", ""))
+        found[stimulus.id] = list(stimulus.words) or [word.text for word in analyse(text, language).words]
+    return found
+
+
+def media_files(
+    spec: StudySpec, text: str, *, source: str = "study file", folder: Path | None = None
+) -> dict[Cell, Path]:
+    """Return the file of each cell that shows one of the experimenter's own.
+
+    Raises
+    ------
+    StudyFileError
+        If a file is not there or of a kind that browsers do not show; the message names line and field.
+    """
+    found: dict[Cell, Path] = {}
+    faults: dict[int, str] = {}
+    places = {stimulus.id: k for k, stimulus in enumerate(spec.stimuli)}
+    for cell in spec.cells():
+        name = spec.stimulus(cell.stimulus).media
+        if name is None:
+            continue
+        path = (folder or Path()) / name.replace("{condition}", cell.condition)
+        if path.suffix.lower().removeprefix(".") not in MEDIA:
+            fault = f"{path.name} is not a file that is shown; right is one that ends in {', '.join(MEDIA)}."
+        elif not path.is_file():
+            fault = f"there is no file {path.name} beside the study file."
+        else:
+            found[cell] = path
+            continue
+        faults.setdefault(places[cell.stimulus], fault)
+    if faults:
+        located = located_yaml.parse(text, source=source)
+        paths: list[tuple[tuple[str | int, ...], str]] = [(("stimuli", k, "media"), why) for k, why in faults.items()]
+        raise StudyFileError(
+            source, [Problem(located.line(path), located_yaml.field_name(path), why) for path, why in paths]
+        )
+    return found
+
+
 def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dict[Cell, ClipSpec]:
-    """Return the specification of the clip of each stimulus in each condition.
+    """Return the specification of the clip of each stimulus in each condition, but for the experimenter's own files.
 
     Parameters
     ----------
@@ -96,6 +186,8 @@ def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dic
     made: dict[Cell, ClipSpec] = {}
     faults: dict[tuple[str, int, str], str] = {}
     for cell in spec.cells():
+        if spec.stimulus(cell.stimulus).media is not None:
+            continue
         alone = {**spec.video.model_dump(), **spec.stimulus(cell.stimulus).clip}
         # What fails without the condition is the stimulus's fault; what fails only with it, the condition's.
         for path, fields in (
@@ -114,17 +206,17 @@ def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dic
     return made
 
 
-def _clip(session: Session, spec: ClipSpec, digest: str) -> Clip:
-    clip = session.scalar(select(Clip).where(Clip.digest == digest))
+def _clip(session: Session, content: _Content) -> Clip:
+    clip = session.scalar(select(Clip).where(Clip.digest == content.digest))
     if clip is None:
-        clip = Clip(digest=digest, spec=spec.to_dict())
+        clip = Clip(digest=content.digest, spec=content.spec, suffix=content.suffix)
         session.add(clip)
-        session.flush()
+    if content.bytes is not None:
+        # A file of one's own is in the store by now, also if it had been lost.
+        clip.status, clip.error, clip.bytes = ClipStatus.DONE, None, content.bytes
+        clip.finished_at = clip.finished_at or now()
+    session.flush()
     return clip
-
-
-def _enrolled(session: Session, study: Study) -> int:
-    return session.scalar(select(func.count(Participant.id)).where(Participant.study_id == study.id)) or 0
 
 
 def find(session: Session, slug: str) -> Study:
@@ -160,7 +252,7 @@ def open_specs(session: Session) -> list[StudySpec]:
     return [spec_of(study) for study in found]
 
 
-def set_state(session: Session, slug: str, state: StudyState) -> Study:
+def set_state(session: Session, slug: str, state: StudyState, *, actor: str = audit.COMMAND_LINE) -> Study:
     """Open or close a study for participants.
 
     Raises
@@ -169,6 +261,8 @@ def set_state(session: Session, slug: str, state: StudyState) -> Study:
         If there is no such study.
     """
     study = find(session, slug)
+    if study.state != state:
+        audit.note(session, study, actor, {StudyState.OPEN: "open", StudyState.CLOSED: "close"}.get(state, state))
     study.state = state
     return study
 

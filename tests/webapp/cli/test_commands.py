@@ -181,7 +181,7 @@ def test_the_life_of_a_study(run: object, tmp_path: Path, database: object, pyte
     assert run("report", "mini").exit_code == 0
     assert run("export", "mini", "--out", str(tmp_path / "out")).exit_code == 0
     assert (tmp_path / "out" / "codebook.csv").is_file()
-    assert run("export", "mini").output.startswith("participant,trial,stimulus,condition,instrument,item,")
+    assert run("export", "mini").output.startswith("participant,part,trial,kind,round,stimulus,condition,")
     assert run("study", "close", "mini").exit_code == 0
     assert json.loads(run("study", "show", "mini", "--json").output)["state"] == "closed"
     assert "properties" in json.loads(run("study", "schema").output)

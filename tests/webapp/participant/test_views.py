@@ -191,6 +191,14 @@ def test_clips_can_be_read_in_parts(browser: Any) -> None:
     assert part.mimetype == "video/mp4"
 
 
+@pytest.mark.parametrize("suffix", ["json", "webm", "html", "mp4.json"])
+def test_only_the_clip_itself_is_sent(browser: Any, suffix: str) -> None:
+    browser.enrol()
+    clip = re.search(r'src="(/clips/[0-9a-f]{64})\.mp4"', browser.text)
+    assert clip is not None
+    assert browser.client.get(f"{clip[1]}.{suffix}").status_code == 404
+
+
 def test_whoever_presses_the_button_twice_is_one_participant(browser: Any, database: Database) -> None:
     browser.open("/s/mini/")
     token = re.search(r'name="csrf_token" value="([^"]+)"', browser.text)

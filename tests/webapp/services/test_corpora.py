@@ -18,7 +18,8 @@ from webapp import farm
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, DatabaseError, NotFoundError
-from webapp.services import corpora
+from webapp.models import Stimulus
+from webapp.services import corpora, rounds, studies
 from webapp.services.corpora import Corpus
 from webapp.services.modelling import ModelReport
 
@@ -206,3 +207,20 @@ def test_the_smaller_set_of_points_can_be_learned_from(
     found = corpora.load(str(tmp_path), settings, seed=0)
     assert found.acii.scheme == read_set(tmp_path).scheme == "acii2007"
     assert len(found.samples.pad) == 213
+
+
+def test_an_annotated_study_gives_what_its_rounds_came_to(
+    settings: Settings, database: Database, apply_study: Callable[..., StudySpec], collect: Callable[..., None]
+) -> None:
+    spec = apply_study("rounds", faces=5, instruments="pad5", annotation="{raters: 3, sets: 2}")
+    collect(spec, 3)
+    samples = corpora.load("study:rounds", settings, seed=0).samples
+    with database.read() as session:
+        study = studies.find(session, "rounds")
+        found = rounds.annotated(session, study, spec, spec.part("faces"))
+        names = [session.get_one(Stimulus, key).name for key, _ in found.stimuli]
+    assert len(samples.pad) == 10
+    assert "mean over 3 raters" in samples.note
+    assert samples.reliability is not None
+    assert sorted(samples.pad.tolist()) == sorted(found.values.tolist())
+    assert sorted(samples.emotions) == sorted(names)

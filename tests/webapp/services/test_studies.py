@@ -1,10 +1,16 @@
+import hashlib
+from typing import Any
+
 import pytest
 
+from evaluation.errors import StudyFileError
 from evaluation.study import StudySpec
+from lab import Lab, always
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
-from webapp.models import Clip
+from webapp.media import MediaStore
+from webapp.models import Clip, StudyState
 from webapp.services import clips, enrolment, studies
 
 
@@ -69,3 +75,113 @@ def test_an_unknown_slug_lists_those_there_are(database: Database, settings: Set
     _apply(database, settings, source)
     with database.read() as session, pytest.raises(NotFoundError, match="there are: mini"):
         studies.find(session, "dmeo")
+
+
+def _picture(colour: int) -> bytes:
+    return b"\x89PNG\r\n\x1a\n" + bytes([colour]) * 20
+
+
+_LABEL = {"en": "x", "zh": "x"}
+
+
+def _own_files(*names: str) -> list[dict[str, Any]]:
+    return [{"id": f"s{place}", "label": _LABEL, "media": name} for place, name in enumerate(names)]
+
+
+class TestOwnFiles:
+    @pytest.mark.every_database
+    def test_they_are_copied_into_the_store_and_need_no_rendering(self, lab: Lab) -> None:
+        for place, name in enumerate(("a_subtle.png", "a_full.png", "b.MP3")):
+            (lab.folder / name).write_bytes(_picture(place))
+        lab.apply(stimuli=_own_files("a_{condition}.png", "b.MP3"))
+        store = MediaStore(lab.settings.media_url)
+        with lab.database.read() as session:
+            found = studies.find(session, "mini").stimuli
+            assert [(one.name, one.condition.name, one.clip.spec["file"]) for one in found] == [
+                ("s0", "subtle", "a_subtle.png"),
+                ("s0", "full", "a_full.png"),
+                ("s1", "subtle", "b.MP3"),
+                ("s1", "full", "b.MP3"),
+            ]
+            assert [one.clip.medium for one in found] == ["image", "image", "audio", "audio"]
+            assert [one.clip.is_still for one in found] == [True, True, False, False]
+            assert found[2].clip_id == found[3].clip_id
+            for one in found:
+                content = (lab.folder / one.clip.spec["file"]).read_bytes()
+                assert one.clip.digest == hashlib.sha256(content).hexdigest()
+                assert (one.clip.status, one.clip.bytes) == ("done", len(content))
+                assert store.read(one.clip.digest, one.clip.suffix) == content
+            assert clips.progress(session, studies.find(session, "mini")).to_dict()["done"] == 3
+        rater = lab.rater()
+        rater.answer_all()
+        assert rater.row().state == "completed"
+
+    def test_faults_are_named_with_their_line(self, lab: Lab) -> None:
+        (lab.folder / "c.txt").write_text("x")
+        (lab.folder / "d.png").mkdir()
+        text = lab.text(stimuli=_own_files("a.png", "c.txt", "d.png"))
+        lines = text.splitlines()
+        with pytest.raises(StudyFileError) as refused, lab.database.write() as session:
+            studies.apply(session, StudySpec.from_yaml(text), text, lab.settings, folder=lab.folder)
+        problems = refused.value.problems
+        assert [lines[(problem.line or 0) - 1].strip() for problem in problems] == [
+            "media: a.png",
+            "media: c.txt",
+            "media: d.png",
+        ]
+        assert "no file a.png" in problems[0].message
+        assert "png" in problems[1].message
+        assert lab.see(studies.overviews) == []
+
+    def test_a_file_that_changed_is_taken_anew_while_nobody_takes_part(self, lab: Lab) -> None:
+        digests = []
+        for colour in (1, 2):
+            (lab.folder / "a.png").write_bytes(_picture(colour))
+            lab.apply(stimuli=_own_files("a.png"))
+            with lab.database.read() as session:
+                digests.append({one.clip.digest for one in studies.find(session, "mini").stimuli})
+        assert not digests[0] & digests[1]
+        lab.rater()
+        (lab.folder / "a.png").write_bytes(_picture(3))
+        lab.apply(stimuli=_own_files("a.png"))
+        with lab.database.read() as session:
+            assert {one.clip.digest for one in studies.find(session, "mini").stimuli} == digests[1]
+
+
+def test_opening_and_closing_is_noted_once(lab: Lab) -> None:
+    lab.apply(is_open=False)
+    for state in (StudyState.OPEN, StudyState.OPEN, StudyState.CLOSED, StudyState.OPEN):
+        lab.do(lambda session, state=state: studies.set_state(session, "mini", state, actor="wu"))
+    assert lab.acts() == ["apply", "open", "close", "open"]
+    assert [entry.actor for entry in lab.audit()] == ["command line", "wu", "wu", "wu"]
+
+
+@pytest.mark.every_database
+def test_overviews_count_people_and_first_answers(lab: Lab) -> None:
+    lab.apply(instruments=["mos5"])
+    lab.apply(slug="other", is_open=False)
+    done, begun = lab.rater(), lab.rater()
+    done.answer_all()
+    begun.answer()
+    begun.send(1, begun.form(1, always(4)))
+    found = [
+        (one.slug, one.state, one.participants, one.completed, one.responses) for one in lab.see(studies.overviews)
+    ]
+    assert found == [("mini", "open", 2, 1, 5), ("other", "draft", 0, 0, 0)]
+    assert [spec.slug for spec in lab.see(studies.open_specs)] == ["mini"]
+
+
+def test_words_are_found_in_the_text_or_given(lab: Lab) -> None:
+    clip = {"pad": [0.1, 0.2, 0.3], "text": "你好世界", "lang": "zh"}
+    stimuli = [
+        {"id": "found", "label": _LABEL, "clip": clip},
+        {"id": "given", "label": _LABEL, "clip": clip, "words": ["你好", "世界"]},
+    ]
+    part = {"presentation": {"assignment": "full"}, "stimuli": stimuli}
+    lab.apply(**part, instruments=["prosodic_words"])
+    lab.apply(**part, slug="other", instruments=["mos5"])
+    with lab.database.read() as session:
+        words = {one.name: one.words for one in studies.find(session, "mini").stimuli}
+        assert words["given"] == ["你好", "世界"]
+        assert "".join(words["found"] or []) == "你好世界"
+        assert {one.words is None for one in studies.find(session, "other").stimuli} == {True}
