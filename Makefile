@@ -21,8 +21,8 @@ setup: $(STAMPS)/python $(STAMPS)/translations $(STAMPS)/face ## install everyth
 demo: setup ## set up, render and serve the demo study (HOST=, PORT=)
 	@$(BIN)/padlab demo --host $(HOST) --port $(PORT)
 
-test: setup ## all tests, on SQLite and PostgreSQL, with a real browser
-	@$(BIN)/python -m pytest
+test: setup ## all tests, on SQLite and PostgreSQL, with a real browser; two files at a time
+	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 soak: setup ## slower proofs: more of the random tests, and whole studies over HTTP (many minutes)
 	@PADLAB_SOAK=1 $(BIN)/python -m pytest tests/soak tests/webapp/services/test_engine_machine.py -s
