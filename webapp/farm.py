@@ -245,6 +245,8 @@ def _outcomes(
             missing.append(job)
     if not missing:
         return
+    # Dressing another face takes a worker longer than drawing a short clip: one after the other.
+    missing.sort(key=lambda job: str(job.spec.get("identity")))
     with Farm(settings, workers=min(workers or os.cpu_count() or 1, len(missing))) as farm:
         for outcome in farm.render(missing, stop):
             if outcome.error is None and not store.has(outcome.digest):

@@ -19,6 +19,9 @@ from evaluation.responses import DIMENSIONS
 from evaluation.statistics import wording
 from evaluation.statistics.opinion import OpinionScore
 
+MOST_NAMED = 40
+"""Number of stimuli above which figures do not name them."""
+
 
 def draw(name: str, report: StudyReport) -> str:
     """Return a figure as the text of an SVG file, the same for the same report.
@@ -54,7 +57,9 @@ def caption(name: str) -> str:
 
 
 def reverse_evaluation(report: StudyReport) -> Figure:
-    """Draw evaluated against input PAD: a panel for each dimension, a labelled point for each stimulus.
+    """Draw evaluated against input PAD: a panel for each dimension, a point for each stimulus.
+
+    Points have their names if there are at most `MOST_NAMED`; more could not be read.
 
     Parameters
     ----------
@@ -88,6 +93,8 @@ def reverse_evaluation(report: StudyReport) -> Figure:
     # The names can be placed only when the layout has settled where each point is.
     figure.draw_without_rendering()
     means = report.pad_by_stimulus
+    if len(means) > MOST_NAMED:
+        return figure
     words = [drawable(label(report.spec.stimulus(word).label), word) for word in means["stimulus"]]
     for axes, dimension in zip(panels, DIMENSIONS, strict=True):
         xs, ys = means[f"input_{dimension}"].to_numpy(dtype=float), means[dimension].to_numpy(dtype=float)

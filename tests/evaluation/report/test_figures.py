@@ -52,6 +52,13 @@ def test_the_scatter_names_stimuli_and_correlations(report):
     assert {"Subtle", "Moderate", "Full", "All conditions"} <= set(shown)
 
 
+def test_the_scatter_names_no_more_stimuli_than_can_be_read(demo, report, monkeypatch):
+    monkeypatch.setattr(figures, "MOST_NAMED", len(demo.stimuli) - 1)
+    shown = texts(figures.draw("reverse_evaluation", report))
+    assert "Happy" not in shown
+    assert [text for text in shown if " r = " in text]
+
+
 def test_the_opinion_figure_names_means_and_the_scale(report):
     shown = texts(figures.draw("mos_by_condition", report))
     assert {f"{found.result.mean:.2f}" for found in report.mos_by_condition} <= set(shown)
