@@ -1,6 +1,6 @@
 """Answers that are known beforehand: of training trials, gold clips and instructed questions."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from evaluation.design.plan import TrialKind
 from evaluation.study_parts import Part
@@ -45,3 +45,35 @@ def passes(accept: Mapping[str, Sequence[int]], answers: Mapping[str, Mapping[st
     return all(
         answers.get(key.partition(".")[0], {}).get(key.partition(".")[2]) in values for key, values in accept.items()
     )
+
+
+def by_place(
+    answers: Mapping[str, Mapping[str, object]], several: Collection[str]
+) -> list[dict[str, dict[str, object]]]:
+    """Return the answers of a page as `passes` takes them: for each clip or word that it asks about.
+
+    Parameters
+    ----------
+    answers : mapping
+        Instrument to item to the keyed answer, items about a clip or word as on the page ("tone-2").
+    several : collection of str
+        Names of the instruments that ask about each clip or word.
+
+    Returns
+    -------
+    list of dict
+        At least one; what is not asked about clips or words is in each. A choice of several options of which one was
+        chosen is that option.
+    """
+    common: dict[str, dict[str, object]] = {}
+    places: dict[int, dict[str, dict[str, object]]] = {}
+    for name, items in answers.items():
+        for key, answer in items.items():
+            item, _, number = key.rpartition("-") if name in several else (key, "", "0")
+            about = places.setdefault(int(number), {}) if name in several else common
+            about.setdefault(name, {})[item] = _only(answer)
+    return [{**common, **about} for _, about in sorted(places.items())] or [common]
+
+
+def _only(answer: object) -> object:
+    return answer[0] if isinstance(answer, tuple | list) and len(answer) == 1 else answer

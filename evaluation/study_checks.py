@@ -1,5 +1,6 @@
 """What must fit together in a study file: names, languages, cells, and the answers that checks accept."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +37,7 @@ def inconsistencies(spec: "StudySpec") -> Iterator[InitErrorDetails]:
     for place, part in _placed_parts(spec):
         known = {name: instruments.get(name) for name in instruments.names()} | own
         yield from _PartChecks(spec, part, place, known).problems()
+    yield from _together(spec)
 
 
 def issue(place: Place, message: str) -> InitErrorDetails:
@@ -60,6 +62,25 @@ def _form(spec: "StudySpec") -> Iterator[InitErrorDetails]:
             yield issue((field,), "a study with parts has this field in each part, not here.")
         if spec.parts is None and getattr(spec, field) is None:
             yield issue((field,), "this field is missing; right is to give it here, or `parts` that each have it.")
+
+
+def _together(spec: "StudySpec") -> Iterator[InitErrorDetails]:
+    """Yield what parts and quota do not allow each other: rounds that could never be complete."""
+    parts = _placed_parts(spec)
+    place, first = parts[0]
+    if first.wait_days:
+        yield issue((*place, "wait_days"), "there is no part before the first; leave this out.")
+    annotated = [(place, part.annotation) for place, part in parts if part.annotation is not None]
+    for place, annotation in annotated:
+        if spec.quota is not None and spec.quota < annotation.raters:
+            message = f"{annotation.raters} raters are needed in a round, but the quota is {spec.quota}."
+            yield issue((*place, "annotation", "raters"), message)
+        if len(annotated) > 1 and annotation.panel != "fixed":
+            message = "several parts are annotated, by the same raters; right is `panel: fixed` in all of them."
+            yield issue((*place, "annotation", "panel"), message)
+        elif annotation.raters != annotated[0][1].raters:
+            message = f"the same raters annotate all parts; right is {annotated[0][1].raters}, as in the first of them."
+            yield issue((*place, "annotation", "raters"), message)
 
 
 def _repeated(spec: "StudySpec") -> Iterator[InitErrorDetails]:
@@ -216,6 +237,9 @@ class _PartChecks:
                     if not stimulus.words and not stimulus.clip.get("text"):
                         message = f"{use.use} needs the words of each sentence; give `words`, or a clip with a text."
                         yield issue(("stimuli", number), message)
+        if together == "pairs" and max(self._conditions().values(), default=2) < 2:
+            message = "no stimulus is there in two conditions, so there are no pairs to show."
+            yield issue((*self.place, "presentation", "together"), message)
         if together == "single" or self.part.annotation is None:
             return
         yield issue((*self.place, "annotation"), f"annotation rates one clip in a trial; here {together} are shown.")
@@ -290,10 +314,33 @@ class _PartChecks:
                     if use.use in self.known and self.known[use.use].per == "word":
                         message = f"{use.use} rates words; right is `mode: consensus`."
                         yield issue((*self.place, "instruments", position), message)
+            yield from self._dimensions(labels=annotation.mode == "consensus")
             if self.part.repeats is not None:
                 yield issue((*self.place, "repeats"), "in annotation the rounds repeat samples; leave this out.")
         elif self.part.repeats is not None and self.part.repeats.count > count:
             yield issue((*self.place, "repeats"), f"there are only {count} trials that could be repeated.")
+
+    def _dimensions(self, *, labels: bool) -> Iterator[InitErrorDetails]:
+        """Check that the raters of a round rate something, and each thing once."""
+        owner: dict[str, str] = {}
+        for position, use in enumerate(self.part.instruments):
+            instrument = self.known.get(use.use)
+            for name in instrument.dimensions(labels=labels) if instrument else ():
+                other = owner.setdefault(name, use.use)
+                # Scores of one name are named already.
+                if other != use.use and not any(score.name == name for score in self.known[other].scores):
+                    message = f"{use.use} and {other} both rate {name}; in annotation the names must differ."
+                    yield issue((*self.place, "instruments", position), message)
+        if labels and not owner:
+            message = "none of the answers is a number or one label, on which raters could agree."
+            yield issue((*self.place, "annotation", "mode"), message)
+
+    def _conditions(self) -> Counter[str]:
+        """Count in how many conditions the part has each stimulus."""
+        chosen = self.part.presentation.cells
+        if chosen is None:
+            return Counter({stimulus.id: len(self.spec.conditions) for stimulus in self.spec.stimuli})
+        return Counter(cell.stimulus for cell in chosen)
 
     def _cell_count(self) -> int:
         chosen = self.part.presentation.cells

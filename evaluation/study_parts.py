@@ -245,7 +245,9 @@ class Completion(Piece):
     """What a participant gets in the end, to prove to a panel that they took part."""
 
     code: Line | None = Field(
-        default=None, description="the code that is shown; 'generate' makes one for each participant"
+        default=None,
+        max_length=40,
+        description="the code that is shown, at most 40 characters; 'generate' makes one for each participant",
     )
     redirect: Line | None = Field(
         default=None,

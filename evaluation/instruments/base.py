@@ -10,7 +10,7 @@ import pandas as pd
 
 from evaluation.errors import AnswerError, EvaluationError
 from evaluation.instruments.answers import ItemError
-from evaluation.instruments.items import Answer, Item, Texts
+from evaluation.instruments.items import Answer, ChoiceItem, Item, Texts
 
 Per = Literal["trial", "clip", "word"]
 """What the items are asked about: the trial as a whole, each clip that it shows, or each word of its sentence."""
@@ -256,6 +256,23 @@ class Instrument:
         checked = self.validate(answers)
         numbers = {item: answer for item, answer in checked.items() if isinstance(answer, int)}
         return {score.name: score.value(numbers) for score in self.scores}
+
+    def partial_scores(self, answers: Mapping[str, int]) -> dict[str, float]:
+        """Return those scores whose items all have an answer, from valid keyed numbers about one clip or word."""
+        return {score.name: score.value(answers) for score in self.scores if score.weights.keys() <= answers.keys()}
+
+    def dimensions(self, *, labels: bool = False) -> tuple[str, ...]:
+        """Return what raters of an annotation rate with it: its scores, or else the items with numbers.
+
+        Parameters
+        ----------
+        labels : bool
+            Also the items of which one option is chosen: raters can agree on labels, which have no mean.
+        """
+        if self.scores:
+            return tuple(score.name for score in self.scores)
+        chosen = [item.id for item in self.items if labels and isinstance(item, ChoiceItem) and not item.multiple]
+        return tuple(item.id for item in self.items if item.numeric or item.id in chosen)
 
     def score_table(self, answers: pd.DataFrame) -> pd.DataFrame:
         """Return the scores of many sets of answers at once.

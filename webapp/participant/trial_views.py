@@ -129,7 +129,7 @@ def answer(slug: str, position: int) -> Response | tuple[str, int]:
                 visit_id=visit,
                 playback=read_playback(request.form.get("playback", "")),
             )
-            finished = following is None and participant.completed_at is not None
+            finished = following is None and db.get_one(Participant, participant.id).completed_at is not None
     except AnswersRefusedError as refused:
         return _answer_again(slug, position, problems=refused.problems)
     except NotWatchedError:
@@ -159,9 +159,11 @@ def _remember_feedback(spec: StudySpec, study: Study, current: Trial, submission
     part = spec.part(current.part)
     accept = known_answers.accepted(part, current.kind, current.check_place)
     answers = {name: own.answers for name, own in submissions.items()}
+    several = {use.use for use in part.instruments if spec.instrument(use.use).per != "trial"}
+    places = known_answers.by_place(answers, several)
     session[f"feedback_{study.slug}"] = {
         "text": part.training[current.check_place].feedback[language_of(spec)],
-        "right": known_answers.passes(accept, answers) if accept else None,
+        "right": all(known_answers.passes(accept, about) for about in places) if accept else None,
     }
 
 

@@ -1,6 +1,7 @@
 """The participant's pages. Each view parses, calls a service, answers."""
 
 from typing import Any
+from urllib.parse import quote
 
 from flask import Blueprint, redirect, render_template, request, session, url_for
 from sqlalchemy.orm import Session
@@ -212,5 +213,5 @@ def debrief(slug: str) -> Response | str:
 def _back_to_panel(spec: StudySpec, participant: Participant) -> str | None:
     if spec.completion.redirect is None:
         return None
-    filled = spec.completion.redirect.replace("{code}", participant.code or "")
-    return filled.replace("{panel_id}", participant.panel_id or "")
+    filled = spec.completion.redirect.replace("{code}", quote(participant.code or "", safe=""))
+    return filled.replace("{panel_id}", quote(participant.panel_id or "", safe=""))

@@ -225,7 +225,16 @@ def trial_lines(session: Session, participant: Participant) -> list[TrialLine]:
 
 
 def begin_visit(session: Session, participant: Participant, *, user_agent: str) -> Visit:
-    """Begin a sitting; the kind of browser is kept only if the study collects it."""
+    """Begin a sitting; the kind of browser is kept only if the study collects it.
+
+    Raises
+    ------
+    ConflictError
+        If the participant has withdrawn: nothing of theirs may come after that.
+    """
+    participant = locked(session, participant.id)
+    if participant.state == ParticipantState.WITHDRAWN:
+        raise ConflictError("You have withdrawn from this study; nothing more is stored")
     spec = studies.spec_of(session.get_one(Study, participant.study_id))
     kept = user_agent[:USER_AGENT_LENGTH] if spec.collect.user_agent else ""
     visit = Visit(participant_id=participant.id, user_agent=kept)

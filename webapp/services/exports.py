@@ -13,7 +13,7 @@ from evaluation.report import export
 from evaluation.responses import DIMENSIONS
 from evaluation.study import StudySpec
 from webapp.errors import ConfigError
-from webapp.services import collected, export_tables, results, studies
+from webapp.services import collected, export_tables, raters, studies
 from webapp.services.counting import statistics_frame
 
 SCORE_COLUMNS = MappingProxyType(
@@ -72,7 +72,7 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
     rows = collected.read(session, study)
-    screenings = {part.name: results.screening(session, slug, part.name) for part in spec.all_parts}
+    screenings = raters.screenings(session, study, rows, [part.name for part in spec.all_parts])
     tables = {
         "responses": _responses(spec, collected.as_frame(rows)),
         "scores": _scores(spec, rows),

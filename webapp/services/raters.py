@@ -96,10 +96,11 @@ def repeats(session: Session, slug: str, part: str | None = None) -> pd.DataFram
         If there is no such study.
     """
     study = studies.find(session, slug)
-    return _repeats(session, study, collected.read(session, study), part)
+    return repeats_among(session, study, collected.read(session, study), part)
 
 
-def _repeats(session: Session, study: Study, rows: Sequence[Collected], part: str | None) -> pd.DataFrame:
+def repeats_among(session: Session, study: Study, rows: Sequence[Collected], part: str | None) -> pd.DataFrame:
+    """Return what `repeats` does, from all answers of the study."""
     spec = studies.spec_of(study)
     query = (
         select(Participant.number, Trial.position, Trial.repeats)
@@ -109,16 +110,24 @@ def _repeats(session: Session, study: Study, rows: Sequence[Collected], part: st
     originals = {(number + 1, place): of for number, place, of in session.execute(query) if of is not None}
     frame = statistics_frame(spec, rows, part, kinds=(*COUNTING, "repeat"))
     known: dict[tuple[int, int, int, str], float] = {}
-    owners = {name: one.name for one in map(spec.instrument, spec.instrument_names) for name in numbers_of(one)}
+    # Two parts may each ask an instrument that has the same score.
+    parts = {(one.participant, one.trial): one.part for one in rows}
+    owners = {
+        (own.name, name): use.use
+        for own in spec.all_parts
+        for use in own.instruments
+        for name in numbers_of(spec.instrument(use.use))
+    }
+    names = {name for _, name in owners}
     scores = score_trials(spec, complete(check_responses(spec, frame)))
     for row in scores.to_dict("records"):
         participant, trial, clip = (int(row[key]) for key in _KEY)
-        known.update({(participant, trial, clip, name): float(row[name]) for name in owners if name in row})
+        known.update({(participant, trial, clip, name): float(row[name]) for name in names if name in row})
     found = [
-        (participant, trial, originals[participant, trial], clip, owners[score], score, first, second)
+        (participant, trial, of, clip, owners[parts[participant, trial], score], score, first, second)
         for (participant, trial, clip, score), second in known.items()
-        if (participant, trial) in originals
-        and (first := known.get((participant, originals[participant, trial], clip, score))) is not None
+        if (of := originals.get((participant, trial))) is not None
+        and (first := known.get((participant, of, clip, score))) is not None
         and not pd.isna(first)
         and not pd.isna(second)
     ]
@@ -138,8 +147,11 @@ def timing(session: Session, slug: str, part: str | None = None) -> pd.DataFrame
     NotFoundError
         If there is no such study.
     """
-    every = collected.trials(session, slug)
-    answered = every[every["state"] == "answered"]
+    return _timing(collected.trials(session, slug), part)
+
+
+def _timing(trials: pd.DataFrame, part: str | None) -> pd.DataFrame:
+    answered = trials[trials["state"] == "answered"]
     if part is not None:
         answered = answered[answered["part"] == part]
     return answered[list(TIMING_COLUMNS)].reset_index(drop=True)
@@ -161,25 +173,42 @@ def screening(session: Session, slug: str, part: str | None = None) -> Screening
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
     name = spec.all_parts[0].name if part is None else part
-    every = collected.read(session, study)
-    rows = [one for one in every if one.part == name and one.kind in COUNTING]
-    times = timing(session, slug, name)
-    known = _checks(session, study, every, name)
-    data = ScreeningData(
-        scores=_scores(spec, rows, name),
-        repeats=_repeats(session, study, every, name),
-        checks=known[known["kind"].isin(["gold", "instructed"])],
-        timing=times[times["kind"].isin(COUNTING)].rename(columns={"watched": "share"}),
-        answers=_page_answers(rows),
-        ranges=_ranges(spec, rows),
-    )
+    return screenings(session, study, collected.read(session, study), [name])[name]
+
+
+def screenings(
+    session: Session, study: Study, rows: Sequence[Collected], parts: Sequence[str]
+) -> dict[str, ScreeningReport]:
+    """Screen the raters of some parts, by their names, from all answers of the study."""
+    trials = collected.trials(session, study.slug)
     made = session.execute(
         select(Participant.number, Decision.gate, Decision.reason)
         .join(Participant, Decision.participant_id == Participant.id)
         .where(Participant.study_id == study.id)
     )
     decisions: dict[str | int, tuple[Gate, str]] = {number + 1: (_gate(gate), reason) for number, gate, reason in made}
-    return screen(spec.screening, data, decisions=decisions)
+    screening_rules = studies.spec_of(study).screening
+    return {
+        name: screen(screening_rules, _evidence(session, study, rows, _timing(trials, name), name), decisions=decisions)
+        for name in parts
+    }
+
+
+def _evidence(
+    session: Session, study: Study, every: Sequence[Collected], times: pd.DataFrame, name: str
+) -> ScreeningData:
+    """Return what the raters of a part are screened by."""
+    spec = studies.spec_of(study)
+    rows = [one for one in every if one.part == name and one.kind in COUNTING]
+    known = _checks(session, study, every, name)
+    return ScreeningData(
+        scores=_scores(spec, rows, name),
+        repeats=repeats_among(session, study, every, name),
+        checks=known[known["kind"].isin(["gold", "instructed"])],
+        timing=times[times["kind"].isin(COUNTING)].rename(columns={"watched": "share"}),
+        answers=_page_answers(rows),
+        ranges=_ranges(spec, rows),
+    )
 
 
 def _gate(name: str) -> Gate:
@@ -211,8 +240,8 @@ def _scores(spec: StudySpec, rows: Sequence[Collected], part: str) -> pd.DataFra
 
 def _word_numbers(instrument: Instrument, answers: dict[str, object]) -> list[tuple[str, float]]:
     if instrument.scores:
-        complete_set = all(item in answers for score in instrument.scores for item in score.weights)
-        return list(instrument.score(answers).items()) if complete_set else []
+        numbers = {item: answer for item, answer in answers.items() if isinstance(answer, int)}
+        return list(instrument.partial_scores(numbers).items())
     return [
         (f"{instrument.name}.{item.id}", float(answer))
         for item in instrument.items

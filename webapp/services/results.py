@@ -12,7 +12,17 @@ from webapp.errors import NotFoundError
 from webapp.services import collected, studies
 from webapp.services.collected import ANSWER_COLUMNS, TRIAL_COLUMNS, answers, trials
 from webapp.services.counting import PREFERENCE_COLUMNS, preferences_frame, statistics_frame
-from webapp.services.raters import CHECK_COLUMNS, REPEAT_COLUMNS, TIMING_COLUMNS, checks, repeats, screening, timing
+from webapp.services.raters import (
+    CHECK_COLUMNS,
+    REPEAT_COLUMNS,
+    TIMING_COLUMNS,
+    checks,
+    repeats,
+    repeats_among,
+    screening,
+    screenings,
+    timing,
+)
 
 __all__ = [
     "ANSWER_COLUMNS",
@@ -110,6 +120,7 @@ def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, Stu
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
     rows = collected.read(session, study)
+    screened = screenings(session, study, rows, parts)
     found = {}
     for name in parts:
         again = spec.part(name).repeats is not None
@@ -117,8 +128,8 @@ def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, Stu
             spec if spec.parts is None else spec.only(name),
             statistics_frame(spec, rows, name),
             preferences=preferences_frame(rows, name),
-            repeats=repeats(session, slug, name) if again else None,
-            screening=screening(session, slug, name),
+            repeats=repeats_among(session, study, rows, name) if again else None,
+            screening=screened[name],
         )
         found[name] = replace(made, study=spec)
     return found

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
-from evaluation.instruments import ChoiceItem, Instrument, Item
+from evaluation.instruments import Instrument
 from evaluation.study import Part, StudySpec
 from webapp.models import AnnotationRound, Participant, ParticipantState, Response, RoundSample, Trial
 
@@ -52,7 +52,7 @@ def read(session: Session, spec: StudySpec, part: Part, rounds: Sequence[Annotat
     names = [use.use for use in part.instruments]
     asked = [spec.instrument(name) for name in names]
     labels = part.annotation is not None and part.annotation.mode == "consensus"
-    dimensions = tuple(dimension for instrument in asked for dimension in _dimensions(instrument, labels=labels))
+    dimensions = tuple(dimension for instrument in asked for dimension in instrument.dimensions(labels=labels))
     keys = [found.id for found in rounds]
     raters = tuple(
         session.scalars(
@@ -123,17 +123,6 @@ def _read_one(
     return RoundRatings(keys, new, order, raters, dimensions, ratings)
 
 
-def _dimensions(instrument: Instrument, *, labels: bool) -> list[str]:
-    """Return what an instrument rates; raters can also agree on labels, which have no mean."""
-    if instrument.scores:
-        return [score.name for score in instrument.scores]
-    return [item.id for item in instrument.items if item.numeric or (labels and _is_label(item))]
-
-
-def _is_label(item: Item) -> bool:
-    return isinstance(item, ChoiceItem) and not item.multiple
-
-
 def _values(instrument: Instrument, answers: Mapping[str, object]) -> dict[int, dict[str, float]]:
     """Return what an instrument's answers say of each word, or under 1 of the sample as a whole."""
     by_word: dict[int, dict[str, int]] = {}
@@ -143,4 +132,5 @@ def _values(instrument: Instrument, answers: Mapping[str, object]) -> dict[int, 
             by_word.setdefault(int(number), {})[name] = answer
     if not instrument.scores:
         return {word: {name: float(answer) for name, answer in own.items()} for word, own in by_word.items()}
-    return {word: instrument.score(own) for word, own in by_word.items()}
+    # What else the instrument asks, a reason say, is not needed for its scores.
+    return {word: instrument.partial_scores(own) for word, own in by_word.items()}

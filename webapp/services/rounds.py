@@ -111,16 +111,16 @@ def first_place(session: Session, study: Study, spec: StudySpec) -> int:
     """Return the first place of the design for which there is still something to rate.
 
     Places of a fixed panel that is through, and those of the earlier rounds of fresh panels, are not filled again:
-    whoever got one would have nothing to do.
+    whoever got one would have nothing to do. As long as one annotated part goes on, its places are filled.
     """
-    first = 0
+    firsts = []
     for part in annotated_parts(spec):
         last = _last(session, study, part)
         if part.annotation is None or last is None:
-            continue
-        over = int(last.final) + (last.number if part.annotation.panel == "fresh" else 0)
-        first = max(first, part.annotation.raters * over)
-    return first
+            return 0
+        over = last.number if part.annotation.panel == "fresh" else 0
+        firsts.append(part.annotation.raters * (over + last.final))
+    return min(firsts, default=0)
 
 
 def answered(session: Session, study: Study, spec: StudySpec, participant: Participant, trial: Trial) -> None:
@@ -339,11 +339,12 @@ class Annotated:
 def annotated(session: Session, study: Study, spec: StudySpec, part: Part) -> Annotated | None:
     """Return what an annotated part has come to so far, None before its first answer."""
     annotation = part.annotation
-    rated = round_ratings.read(session, spec, part, _all(session, study, part))
+    found = _all(session, study, part)
+    rated = round_ratings.read(session, spec, part, found)
     if annotation is None or not rated or not rated[0].raters:
         return None
     if annotation.mode == "consensus":
-        return _last_words(rated, annotation.agree)
+        return _last_words(rated, [one.completed_at is not None for one in found], annotation.agree)
     known = sorted({key for one in rated for key in _rated(one)})
     if not known:
         return None
@@ -368,12 +369,12 @@ def _rated(one: RoundRatings) -> set[int]:
     return {one.samples[one.rows[row][0]] for row in there}
 
 
-def _last_words(rated: list[RoundRatings], agree: int) -> Annotated:
-    """Return for each row what its raters said in the last round that held it."""
+def _last_words(rated: list[RoundRatings], complete: list[bool], agree: int) -> Annotated:
+    """Return each row's ratings of its last complete round: an open discussion does not undo what was agreed on."""
     latest: dict[tuple[int, int], FloatArray] = {}
-    for one in rated:
+    for one, is_complete in zip(rated, complete, strict=True):
         for (place, word), ratings in zip(one.rows, one.ratings, strict=True):
-            if not np.isnan(ratings).all():
+            if not np.isnan(ratings).all() and (is_complete or (one.samples[place], word) not in latest):
                 latest[one.samples[place], word] = ratings
     raters, dimensions = rated[0].raters, rated[0].dimensions
     ratings = np.array(list(latest.values())).reshape(len(latest), len(raters), len(dimensions))

@@ -149,6 +149,9 @@ def media_files(
         path = (folder or Path()) / name.replace("{condition}", cell.condition)
         if path.suffix.lower().removeprefix(".") not in MEDIA:
             fault = f"{path.name} is not a file that is shown; right is one that ends in {', '.join(MEDIA)}."
+        elif Path(name).is_absolute() or ".." in Path(name).parts:
+            # A study file of somebody else must not publish what lies anywhere on this computer.
+            fault = f"{name} leads out of the study file's folder; right is a file beside it, or in a folder there."
         elif not path.is_file():
             fault = f"there is no file {path.name} beside the study file."
         else:

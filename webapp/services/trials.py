@@ -112,9 +112,13 @@ def remaining(session: Session, participant: Participant, part: str) -> int:
 
 def mark_shown(session: Session, trial_id: int) -> None:
     """Record when a trial was first on the screen, which is a sign of life, too."""
-    trial = session.get_one(Trial, trial_id)
+    owner = session.scalar(select(Trial.participant_id).where(Trial.id == trial_id))
+    if owner is None:
+        # They withdrew in another tab, and the trial is gone.
+        return
+    # The participant before the trial, as everywhere: whoever answers at this moment waits, or is waited for.
+    participant = enrolment.locked(session, owner)
     session.execute(update(Trial).where(Trial.id == trial_id, Trial.shown_at.is_(None)).values(shown_at=now()))
-    participant = enrolment.locked(session, trial.participant_id)
     if participant.state == ParticipantState.ACTIVE:
         places.sign_of_life(participant, studies.spec_of(session.get_one(Study, participant.study_id)))
 

@@ -5,6 +5,7 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
+import yaml
 from flask import Flask
 from sqlalchemy import select
 
@@ -247,3 +248,27 @@ def test_a_study_that_is_full_says_so(database: Database, settings: Settings, br
     browser.open("/s/small/")
     assert browser.send("/s/small/consent", {"consent": "yes"}).status_code == 409
     assert "All places are taken" in browser.text
+
+
+def test_practice_about_words_and_several_options_is_told_right(
+    app: Flask, browser: Any, database: Database, settings: Settings
+) -> None:
+    content = yaml.safe_load(ITEMS.read_text(encoding="utf-8"))
+    cell = {"stimulus": "happy", "condition": "full"}
+    accepted = [{"prosodic_words.P": [1]}, {"every.seen": [3]}]
+    content["slug"] = "practice"
+    content["parts"] = [
+        {
+            "name": "words",
+            "instruments": ["prosodic_words", "every"],
+            "presentation": {"assignment": "full", "cells": [cell]},
+            "training": [{**cell, "accept": accept, "feedback": {"en": "So.", "zh": "好。"}} for accept in accepted],
+        }
+    ]
+    begin(database, settings, yaml.safe_dump(content, allow_unicode=True))
+    _enrol(browser, "practice")
+    words = {"prosodic_words.P-1": "1", "prosodic_words.P-2": "1", "prosodic_words.A-1": "0", "prosodic_words.A-2": "0"}
+    browser.send("/s/practice/trial/1", {**EVERY, **words})
+    assert "well done" in browser.text
+    browser.send("/s/practice/trial/2", {**EVERY, **words, "every.seen": ["3"]})
+    assert "well done" in browser.text

@@ -44,6 +44,24 @@ class TestConsensus:
         values = {key: list(value) for (key, _), value in zip(found.stimuli, found.values, strict=True)}
         assert values == {key: [0.5] * 3 if key % 4 == 1 else [0.0] * 3 for key in values}
 
+    def test_an_open_discussion_does_not_undo_what_was_agreed_on(self, lab: Lab) -> None:
+        def choose(value: int) -> Any:
+            return lambda item, trial: [] if isinstance(item, TextItem) else [str(value if item.id == "P" else 1)]
+
+        apply_annotation(lab, mode="consensus", raters=2, agree=2, sets=1)
+        panel = [lab.rater(), lab.rater()]
+        for value, rater in enumerate(panel):
+            rater.answer_all(choose(value), most=4)
+        panel[0].come_back()
+        panel[0].answer(choose(1))
+        values = annotation_of(lab).values
+        assert np.isnan(values[:, 0]).all()
+        assert (values[:, 1:] == 0.5).all()
+        for rater in panel:
+            rater.come_back()
+            rater.answer_all(choose(1))
+        assert (annotation_of(lab).values == 0.5).all()
+
     def test_discussions_end_by_their_number(self, lab: Lab) -> None:
         apply_annotation(lab, mode="consensus", raters=3, agree=2, sets=1, stop={"rounds": 2})
         panel = [lab.rater() for _ in range(3)]

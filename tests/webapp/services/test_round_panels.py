@@ -121,6 +121,26 @@ class TestChangesInAPanel:
         with pytest.raises(enrolment.FullError):
             lab.rater()
 
+    def test_who_lapses_in_a_later_part_is_replaced_though_the_first_is_through(self, lab: Lab) -> None:
+        second = {
+            "name": "again",
+            "instruments": ["mos5"],
+            "presentation": {"assignment": "full"},
+            "annotation": {"raters": 2, "sets": 1, "share": 0},
+        }
+        apply_annotation(lab, sets=1, share=0, more=[second])
+        panel = [lab.rater(), lab.rater()]
+        panel[0].answer_all()
+        panel[1].answer_all(most=4)
+        panel[0].come_back()
+        panel[0].answer_all()
+        panel[1].be_late()
+        replacement = lab.rater()
+        assert replacement.row().slot == panel[1].row().slot
+        assert {trial.part for trial in replacement.trials()} == {"again"}
+        replacement.answer_all()
+        assert replacement.row().state == "completed"
+
     def test_who_waits_does_not_lapse_until_the_next_round_is_open(self, lab: Lab) -> None:
         apply_annotation(lab)
         first, second = lab.rater(), lab.rater()

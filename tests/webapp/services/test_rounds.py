@@ -211,3 +211,26 @@ def test_a_changed_answer_counts_in_its_round(lab: Lab) -> None:
     values = {key: list(value) for (key, _), value in zip(found.stimuli, found.values, strict=True)}
     assert values == {key: [0.5 if key == changed else 0.0] * 3 for key in values}
     assert len(overview_of(lab)) == 1
+
+
+def test_an_instrument_with_a_score_may_ask_for_a_reason_too(lab: Lab) -> None:
+    def text(value: str) -> dict[str, str]:
+        return {"en": value, "zh": value}
+
+    items = [
+        {"id": "warm", "kind": "slider", "prompt": text("Warm"), "left": text("cold"), "right": text("hot")},
+        {"id": "why", "kind": "text", "prompt": text("Why"), "required": True},
+    ]
+    scores = [{"name": "warmth", "text": "Warmth", "formula": "warm / 100"}]
+    own = {"name": "own", "title": text("Own"), "instruction": text("Rate."), "items": items, "scores": scores}
+    part = {
+        "name": "rate",
+        "instruments": ["own"],
+        "presentation": {"assignment": "full"},
+        "annotation": {"raters": 2, "sets": 1, "share": 0},
+    }
+    lab.apply(parts=[part], own_instruments=[own])
+    for _ in range(2):
+        lab.rater().answer_all(lambda item, trial: ["because" if item.id == "why" else "50"])
+    assert lab.acts()[-1] == "end rounds"
+    assert annotation_of(lab).values.tolist() == [[0.5]] * 4

@@ -133,6 +133,16 @@ class TestOwnFiles:
         assert "png" in problems[1].message
         assert lab.see(studies.overviews) == []
 
+    @pytest.mark.parametrize("absolute", [False, True])
+    def test_nothing_outside_of_the_folder_is_shown(self, lab: Lab, absolute: bool) -> None:
+        outside = lab.folder / "secret.png"
+        outside.write_bytes(_picture(1))
+        folder = lab.folder / "study"
+        folder.mkdir()
+        text = lab.text(stimuli=_own_files(str(outside) if absolute else "../secret.png"))
+        with pytest.raises(StudyFileError, match="out of the study file's folder"):
+            studies.media_files(StudySpec.from_yaml(text), text, folder=folder)
+
     def test_a_file_that_changed_is_taken_anew_while_nobody_takes_part(self, lab: Lab) -> None:
         digests = []
         for colour in (1, 2):

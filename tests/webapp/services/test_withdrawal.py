@@ -211,3 +211,16 @@ def test_withdrawing_while_answering_and_deciding(lab: Lab, extent: Extent) -> N
             assert isinstance(found[1], (ConflictError, NotFoundError)), found
         assert not any("Ann" in str((one.answers, one.raw)) for one in rater.responses())
         assert extent == Extent.ANONYMISE or rater.trials() == []
+
+
+def test_nothing_of_another_tab_comes_after_a_withdrawal(lab: Lab) -> None:
+    lab.apply()
+    rater = lab.rater()
+    current = rater.current()
+    assert current is not None
+    person = rater.row()
+    lab.do(lambda session: withdrawal.withdraw(session, person, Extent.ERASE, actor="participant"))
+    lab.do(lambda session: trials.mark_shown(session, current.id))
+    with pytest.raises(ConflictError, match="withdrawn"):
+        lab.do(lambda session: enrolment.begin_visit(session, person, user_agent="Mozilla"))
+    assert lab.see(lambda session: session.scalar(select(func.count(Visit.id)))) == 0
