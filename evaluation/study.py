@@ -84,7 +84,10 @@ class StudySpec(Piece):
     )
     quota: int | None = Field(default=None, ge=1, description="how many participants are wanted; left out, any number")
     lapse_hours: float = Field(
-        default=24.0, gt=0, description="hours without a sign of a participant after which their place is given back"
+        default=24.0,
+        gt=0,
+        le=87_600,
+        description="hours without a sign of a participant after which their place is given back, at most 87600",
     )
     completion: Completion = Completion()
     collect: Collect = Collect()

@@ -1,5 +1,7 @@
 """What must fit together in a study file: names, languages, cells, and the answers that checks accept."""
 
+import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,6 +20,12 @@ if TYPE_CHECKING:
 
 Place = tuple[str | int, ...]
 
+_LIMITS = {
+    **dict.fromkeys(("gold", "instructed", "watched", "straight_lining", "kurtosis"), (0.0, 1.0)),
+    "correlation": (-1.0, 1.0),
+}
+"""Least and largest limit of the rules of screening; of the others, from 0 on."""
+
 
 def inconsistencies(spec: "StudySpec") -> Iterator[InitErrorDetails]:
     """Yield what does not fit together, each with its place in the file.
@@ -32,6 +40,8 @@ def inconsistencies(spec: "StudySpec") -> Iterator[InitErrorDetails]:
     own, faults = _own_instruments(spec)
     yield from faults
     yield from _form(spec)
+    yield from _screening(spec)
+    yield from _completion(spec)
     if faults or not _has_parts(spec):
         return
     for place, part in _placed_parts(spec):
@@ -81,6 +91,29 @@ def _together(spec: "StudySpec") -> Iterator[InitErrorDetails]:
         elif annotation.raters != annotated[0][1].raters:
             message = f"the same raters annotate all parts; right is {annotated[0][1].raters}, as in the first of them."
             yield issue((*place, "annotation", "raters"), message)
+
+
+def _screening(spec: "StudySpec") -> Iterator[InitErrorDetails]:
+    for rule in type(spec.screening).model_fields:
+        threshold = getattr(spec.screening, rule)
+        low, high = _LIMITS.get(rule, (0.0, math.inf))
+        if threshold is not None and not low <= threshold.limit <= high:
+            right = f"from {low:g} to {high:g}" if high < math.inf else f"of {low:g} or more"
+            yield issue(
+                ("screening", rule, "limit"), f"{threshold.limit:g} is no limit of {rule}; right is a number {right}."
+            )
+
+
+def _completion(spec: "StudySpec") -> Iterator[InitErrorDetails]:
+    redirect = spec.completion.redirect or ""
+    place = ("completion", "redirect")
+    for name in re.findall(r"\{([^{}]*)\}", redirect):
+        if name not in {"code", "panel_id"}:
+            yield issue(place, f"{{{name}}} stands for nothing; right are {{code}} and {{panel_id}}.")
+    if "{code}" in redirect and spec.completion.code is None:
+        yield issue(place, "{code} stands for a code, but there is none; give `code`, or leave it out.")
+    if "{panel_id}" in redirect and not spec.collect.panel_id:
+        yield issue(place, "{panel_id} is not stored, since `collect` says so; leave it out, or collect it.")
 
 
 def _repeated(spec: "StudySpec") -> Iterator[InitErrorDetails]:
@@ -234,7 +267,8 @@ class _PartChecks:
                 yield issue(place, f"{use.use} asks about the words of one clip; here several are shown together.")
             if instrument.per == "word":
                 for number, stimulus in enumerate(self.spec.stimuli):
-                    if not stimulus.words and not stimulus.clip.get("text"):
+                    shown = stimulus.id in self._conditions()
+                    if shown and not stimulus.words and not stimulus.clip.get("text"):
                         message = f"{use.use} needs the words of each sentence; give `words`, or a clip with a text."
                         yield issue(("stimuli", number), message)
         if together == "pairs" and max(self._conditions().values(), default=2) < 2:

@@ -252,7 +252,7 @@ class Completion(Piece):
     redirect: Line | None = Field(
         default=None,
         pattern=r"^https?://",
-        description="address that leads back to the panel; {code} and {panel_id} stand for what they name",
+        description="an address with https:// that leads back; {code} and {panel_id} stand for what they name",
     )
 
 

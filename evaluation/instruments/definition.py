@@ -40,6 +40,9 @@ TAKEN = frozenset(
         "value",
         "n",
         "mean",
+        "input_P",
+        "input_A",
+        "input_D",
     }
 )
 """Names that scores cannot have, since they are columns of tables in which scores are columns, too."""

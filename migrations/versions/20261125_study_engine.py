@@ -5,6 +5,8 @@ Revises: 05b9b014921c
 Create Date: 2026-11-25 21:45:10.224519
 """
 
+from datetime import UTC, datetime, timedelta
+
 import sqlalchemy as sa
 from alembic import op
 
@@ -128,6 +130,10 @@ def _participants() -> None:
     # Until now everybody had the place of their number, and a study had one part.
     op.execute("UPDATE participant SET slot = number")
     op.execute("UPDATE participant SET state = 'completed', part = 1 WHERE completed_at IS NOT NULL")
+    # Who is in the middle keeps the place for a day from now on, as everybody does.
+    people = sa.table("participant", sa.column("state", sa.String), sa.column("due_at", _MOMENT))
+    tomorrow = datetime.now(UTC) + timedelta(days=1)
+    op.execute(people.update().where(people.c.state == "active").values(due_at=tomorrow))
     _without_default("participant", "slot", sa.Integer())
     _without_default("participant", "state", sa.String(length=10))
     _without_default("participant", "part", sa.Integer())

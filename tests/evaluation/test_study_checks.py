@@ -80,3 +80,36 @@ def test_what_goes_together() -> None:
     labels = own("one", item("label", "choice", options=OPTIONS), item("why", "text"))
     rated = part(instruments=["one"], annotation={"raters": 3, "mode": "consensus"})
     StudySpec.from_yaml(study([rated], own_instruments=[labels]))
+
+
+@pytest.mark.parametrize(
+    ("more", "field", "message"),
+    [
+        ({"screening": {"gold": {"limit": 50}}}, "screening.gold.limit", "right is a number from 0 to 1"),
+        ({"screening": {"z_score": {"limit": -3}}}, "screening.z_score.limit", "right is a number of 0 or more"),
+        ({"screening": {"correlation": {"limit": -2}}}, "screening.correlation.limit", "from -1 to 1"),
+        ({"completion": {"redirect": "https://x.example/?cc={code}"}}, "completion.redirect", "there is none"),
+        ({"completion": {"code": "A", "redirect": "https://x.example/?cc={cod}"}}, "completion.redirect", "{cod}"),
+        (
+            {"completion": {"redirect": "https://x.example/?p={panel_id}"}, "collect": {"panel_id": False}},
+            "completion.redirect",
+            "is not stored",
+        ),
+        ({"lapse_hours": 1.0e12}, "lapse_hours", "87600"),
+    ],
+)
+def test_limits_and_addresses_that_make_no_sense_are_refused(more: dict[str, Any], field: str, message: str) -> None:
+    with pytest.raises(StudyFileError) as refused:
+        StudySpec.from_yaml(study([part()], **more))
+    assert refused.value.field == field
+    assert message in str(refused.value)
+
+
+def test_words_are_needed_only_of_sentences_that_are_asked_about() -> None:
+    content = yaml.safe_load(study([{**part(), "instruments": ["prosodic_words"]}]))
+    content["stimuli"][0]["words"] = ["one", "two"]
+    with pytest.raises(StudyFileError, match="needs the words"):
+        StudySpec.from_yaml(yaml.safe_dump(content))
+    content["parts"][0]["presentation"]["cells"] = [{"stimulus": "happy", "condition": "full"}]
+    content["parts"].append(part("other"))
+    assert StudySpec.from_yaml(yaml.safe_dump(content)).part("rate").instruments[0].use == "prosodic_words"

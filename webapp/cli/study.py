@@ -1,7 +1,6 @@
 """``padlab study``: study files and the studies made of them."""
 
 import dataclasses
-import sys
 from pathlib import Path
 
 import click
@@ -69,11 +68,6 @@ def apply(file: Path) -> None:
     with database.write() as session:
         slug = studies.apply(session, spec, text, settings, folder=file.parent).slug
     click.echo(f"The study '{slug}' is applied. Next: padlab clips render {slug}; padlab study open {slug}")
-
-
-def on_terminal() -> bool:
-    """Tell whether somebody is there who can be asked."""
-    return sys.stdin.isatty()
 
 
 def _check_contents(spec: StudySpec, text: str, file: Path) -> None:
@@ -162,7 +156,7 @@ def withdraw(slug: str, participant: int, *, erase: bool, anonymise: bool, yes: 
         person = enrolment.find_by_number(session, slug, participant - 1)
         if person.state == ParticipantState.WITHDRAWN:
             raise ConflictError(f"Participant {participant} of the study '{slug}' has withdrawn already")
-    if not yes and on_terminal():
+    if not yes:
         what = "Keep the ratings, but no trace, of" if anonymise else "Delete all answers of"
         click.confirm(f"{what} participant {participant} of '{slug}'? This cannot be taken back", abort=True)
     with database.write() as session:

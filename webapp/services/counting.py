@@ -31,6 +31,7 @@ def statistics_frame(
     kinds : sequence of str
         Kinds of the trials.
     """
+    rows = _last_words(spec, rows)
     per = {(one.name, item.id): one.per for one in asked_about_clips(spec) for item in statistical(one)}
     found = [
         (
@@ -45,6 +46,22 @@ def statistics_frame(
         and (len(one.conditions) == 1 or per[one.instrument, one.item] == "clip")
     ]
     return pd.DataFrame(found, columns=[*RESPONSE_COLUMNS, *OPTIONAL_COLUMNS])
+
+
+def _last_words(spec: StudySpec, rows: Sequence[Collected]) -> Sequence[Collected]:
+    """Leave out what was said in a consensus before the last time that a rater spoke about a clip."""
+    annotated = [part for part in spec.all_parts if part.annotation is not None]
+    discussed = {part.name for part in annotated if part.annotation and part.annotation.mode == "consensus"}
+    last: dict[tuple[object, ...], int] = {}
+    for one in rows:
+        if one.part in discussed:
+            key = (one.part, one.participant, one.stimulus, one.condition)
+            last[key] = max(last.get(key, 0), one.trial)
+    return [
+        one
+        for one in rows
+        if one.part not in discussed or one.trial == last[one.part, one.participant, one.stimulus, one.condition]
+    ]
 
 
 def preferences_frame(rows: Sequence[Collected], part: str | None = None) -> pd.DataFrame:

@@ -56,4 +56,4 @@ def decide(session: Session, participant: Participant, gate: str, reason: str, *
         found = Decision(participant_id=participant.id, gate=gate, reason=reason)
         session.add(found)
     found.gate, found.reason, found.made_at = gate, reason, now()
-    audit.note(session, study, actor, "decide", participant=participant.number, gate=gate, reason=reason)
+    audit.note(session, study, actor, "decide", participant=participant.number, gate=gate)

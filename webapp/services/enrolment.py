@@ -58,8 +58,6 @@ _PANELS = {
     "mturk": ("workerId", "assignmentId"),
     "sona": ("survey_code", ""),
 }
-# Numbers of SONA are short: who types another one must not get into that person's study.
-_SECRET_ENOUGH = frozenset({"prolific", "mturk"})
 
 
 def panel_of(parameters: Mapping[str, str]) -> Panel | None:
@@ -90,7 +88,8 @@ def enrol(
         The person's secret (see `new_token`). Enrolling again with the same one changes nothing: whoever presses the
         button twice is one participant.
     panel : Panel, optional
-        Whom a panel says that this is. A person comes into a study once.
+        Whom a panel says that this is. A person comes into a study once. Who comes again in the same sitting of the
+        panel goes on; a person's identifier alone opens nothing, since others may know it.
 
     Raises
     ------
@@ -112,7 +111,7 @@ def enrol(
         return enrolled
     if panel is not None:
         known = find_by_panel(session, study, panel)
-        if known is not None and panel.name in _SECRET_ENOUGH and known.state != ParticipantState.WITHDRAWN:
+        if known is not None and panel.session and panel.session == known.panel_session:
             return known
         if known is not None:
             raise ConflictError("You take part in this study already; please go on with your personal link")

@@ -280,6 +280,8 @@ def _overview(session: Session, study: Study, spec: StudySpec, part: Part) -> li
     if annotation is None:
         return []
     found = _all(session, study, part)
+    asked = [spec.instrument(use.use) for use in part.instruments]
+    numbers = {name for instrument in asked for name in instrument.dimensions(labels=False)}
     lines = []
     for own, rated in zip(found, round_ratings.read(session, spec, part, found), strict=True):
         agreement = round_agreement(rated.ratings, dimensions=rated.dimensions)
@@ -292,9 +294,9 @@ def _overview(session: Session, study: Study, spec: StudySpec, part: Part) -> li
                 raters=annotation.raters,
                 finished=round_ratings.finished_raters(session, own),
                 complete=own.completed_at is not None,
-                sd={one.dimension: one.sd for one in agreement.dimensions},
-                pairwise_r={one.dimension: one.pairwise_r for one in agreement.dimensions},
-                largest_p={one.dimension: one.largest_p for one in agreement.dimensions},
+                sd={one.dimension: one.sd for one in agreement.dimensions if one.dimension in numbers},
+                pairwise_r={one.dimension: one.pairwise_r for one in agreement.dimensions if one.dimension in numbers},
+                largest_p={one.dimension: one.largest_p for one in agreement.dimensions if one.dimension in numbers},
                 agreed=_agreed(rated, annotation.agree) if annotation.mode == "consensus" else None,
             )
         )

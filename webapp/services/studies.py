@@ -15,9 +15,11 @@ from synth.clip import clip_digest
 from synth.clip_spec import ClipSpec
 from synth.errors import SpecError
 from synth.text.analysis import analyse
+from webapp import media_check
 from webapp.config import Settings
 from webapp.errors import ConflictError, NotFoundError
 from webapp.media import CLIP, MediaStore
+from webapp.media_check import UnplayableError
 from webapp.models import Clip, ClipStatus, Condition, Participant, Response, Stimulus, Study, StudyState, Trial
 from webapp.models.columns import now
 from webapp.models.study import MEDIA
@@ -101,6 +103,7 @@ class _Content:
     spec: dict[str, Any]
     suffix: str = CLIP
     bytes: int | None = None
+    duration_s: float | None = None
 
 
 def _contents(spec: StudySpec, text: str, settings: Settings, folder: Path | None) -> dict[Cell, _Content]:
@@ -114,7 +117,8 @@ def _contents(spec: StudySpec, text: str, settings: Settings, folder: Path | Non
     for cell, path in files.items():
         digest = store.add_file(path) if store is not None else ""
         suffix = path.suffix.lower().removeprefix(".")
-        found[cell] = _Content(digest, {"file": path.name}, suffix, path.stat().st_size)
+        length = media_check.duration_s(path)
+        found[cell] = _Content(digest, {"file": path.name}, suffix, path.stat().st_size, length)
     return {cell: found[cell] for cell in spec.cells()}
 
 
@@ -153,10 +157,15 @@ def media_files(
             # A study file of somebody else must not publish what lies anywhere on this computer.
             fault = f"{name} leads out of the study file's folder; right is a file beside it, or in a folder there."
         elif not path.is_file():
-            fault = f"there is no file {path.name} beside the study file."
+            fault = f"there is no file {name.replace('{condition}', cell.condition)} beside the study file."
         else:
-            found[cell] = path
-            continue
+            try:
+                media_check.duration_s(path)
+            except UnplayableError as error:
+                fault = f"the file {name.replace('{condition}', cell.condition)} {error}."
+            else:
+                found[cell] = path
+                continue
         faults.setdefault(places[cell.stimulus], fault)
     if faults:
         located = located_yaml.parse(text, source=source)
@@ -217,7 +226,7 @@ def _clip(session: Session, content: _Content) -> Clip:
     if content.bytes is not None:
         # A file of one's own is in the store by now, also if it had been lost.
         clip.status, clip.error, clip.bytes = ClipStatus.DONE, None, content.bytes
-        clip.finished_at = clip.finished_at or now()
+        clip.finished_at, clip.duration_s = clip.finished_at or now(), content.duration_s
     session.flush()
     return clip
 

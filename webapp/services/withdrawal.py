@@ -93,6 +93,8 @@ def _erase(session: Session, participant: Participant) -> dict[str, int]:
 
 def _anonymise(session: Session, study: Study, participant: Participant) -> dict[str, int]:
     session.execute(update(Visit).where(Visit.participant_id == participant.id).values(user_agent=""))
+    # The decision stays, since the ratings do; its reason may tell who it was.
+    session.execute(update(Decision).where(Decision.participant_id == participant.id).values(reason="withdrawn"))
     texts = _text_items(studies.spec_of(study))
     removed = 0
     own = select(Response).join(Trial).where(Trial.participant_id == participant.id)

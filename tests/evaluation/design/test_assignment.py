@@ -148,8 +148,8 @@ def test_all_together_is_one_trial_for_each_stimulus_with_what_there_is(study):
 
 
 def test_pairs_of_stimuli_in_one_condition_are_refused(study):
-    with pytest.raises(EvaluationError, match="no stimulus is there in two conditions"):
-        assigned_trials(study(3, 1, together="pairs"), "one", 0)
+    with pytest.raises(ValueError, match="no stimulus is there in two conditions"):
+        study(3, 1, together="pairs")
 
 
 def test_parts_have_streams_of_their_own_and_must_be_named(study):

@@ -53,8 +53,8 @@ def test_a_participant_withdraws_by_number(
 
 
 @pytest.mark.usefixtures("answered")
-def test_on_a_terminal_it_asks_first(run: Run, database: Database, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("webapp.cli.study.on_terminal", lambda: True)
+def test_it_asks_first(run: Run, database: Database) -> None:
+    assert run("study", "withdraw", "people", "1", stdin="").exit_code == 1
     refused = run("study", "withdraw", "people", "1", stdin="n\n")
     assert refused.exit_code == 1
     assert "cannot be taken back" in refused.output
@@ -81,6 +81,6 @@ def test_media_files_are_looked_for_beside_the_study_file(run: Run, database: Da
     for command in ("validate", "apply"):
         missing = run("study", command, str(path))
         assert missing.exit_code == 1
-        assert "there is no file 1.png beside the study file" in missing.stderr
+        assert "there is no file faces/1.png beside the study file" in missing.stderr
     (path.parent / "faces" / "1.png").write_bytes(png(1))
     assert run("study", "apply", str(path)).exit_code == 0

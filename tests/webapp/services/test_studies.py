@@ -1,4 +1,6 @@
 import hashlib
+import io
+import wave
 from typing import Any
 
 import pytest
@@ -6,6 +8,7 @@ import pytest
 from evaluation.errors import StudyFileError
 from evaluation.study import StudySpec
 from lab import Lab, always
+from pictures import png
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
@@ -77,8 +80,15 @@ def test_an_unknown_slug_lists_those_there_are(database: Database, settings: Set
         studies.find(session, "dmeo")
 
 
-def _picture(colour: int) -> bytes:
-    return b"\x89PNG\r\n\x1a\n" + bytes([colour]) * 20
+def _sound() -> bytes:
+    """Return half a second of silence."""
+    buffer = io.BytesIO()
+    with wave.open(buffer, "wb") as out:
+        out.setnchannels(1)
+        out.setsampwidth(2)
+        out.setframerate(8000)
+        out.writeframes(bytes(8000))
+    return buffer.getvalue()
 
 
 _LABEL = {"en": "x", "zh": "x"}
@@ -91,20 +101,22 @@ def _own_files(*names: str) -> list[dict[str, Any]]:
 class TestOwnFiles:
     @pytest.mark.every_database
     def test_they_are_copied_into_the_store_and_need_no_rendering(self, lab: Lab) -> None:
-        for place, name in enumerate(("a_subtle.png", "a_full.png", "b.MP3")):
-            (lab.folder / name).write_bytes(_picture(place))
-        lab.apply(stimuli=_own_files("a_{condition}.png", "b.MP3"))
+        for place, name in enumerate(("a_subtle.png", "a_full.png")):
+            (lab.folder / name).write_bytes(png(place))
+        (lab.folder / "b.WAV").write_bytes(_sound())
+        lab.apply(stimuli=_own_files("a_{condition}.png", "b.WAV"))
         store = MediaStore(lab.settings.media_url)
         with lab.database.read() as session:
             found = studies.find(session, "mini").stimuli
             assert [(one.name, one.condition.name, one.clip.spec["file"]) for one in found] == [
                 ("s0", "subtle", "a_subtle.png"),
                 ("s0", "full", "a_full.png"),
-                ("s1", "subtle", "b.MP3"),
-                ("s1", "full", "b.MP3"),
+                ("s1", "subtle", "b.WAV"),
+                ("s1", "full", "b.WAV"),
             ]
             assert [one.clip.medium for one in found] == ["image", "image", "audio", "audio"]
             assert [one.clip.is_still for one in found] == [True, True, False, False]
+            assert [one.clip.duration_s for one in found] == [None, None, 0.5, 0.5]
             assert found[2].clip_id == found[3].clip_id
             for one in found:
                 content = (lab.folder / one.clip.spec["file"]).read_bytes()
@@ -133,10 +145,18 @@ class TestOwnFiles:
         assert "png" in problems[1].message
         assert lab.see(studies.overviews) == []
 
+    @pytest.mark.parametrize("name", ["a.png", "a.mp4", "a.wav"])
+    @pytest.mark.parametrize("content", [b"", b"<html></html>", bytes(2000)])
+    def test_what_no_browser_could_show_is_refused(self, lab: Lab, name: str, content: bytes) -> None:
+        (lab.folder / name).write_bytes(content)
+        text = lab.text(stimuli=_own_files(name))
+        with pytest.raises(StudyFileError, match=f"the file {name} (cannot be played|is no picture|is empty)"):
+            studies.media_files(StudySpec.from_yaml(text), text, folder=lab.folder)
+
     @pytest.mark.parametrize("absolute", [False, True])
     def test_nothing_outside_of_the_folder_is_shown(self, lab: Lab, absolute: bool) -> None:
         outside = lab.folder / "secret.png"
-        outside.write_bytes(_picture(1))
+        outside.write_bytes(png(1))
         folder = lab.folder / "study"
         folder.mkdir()
         text = lab.text(stimuli=_own_files(str(outside) if absolute else "../secret.png"))
@@ -146,13 +166,13 @@ class TestOwnFiles:
     def test_a_file_that_changed_is_taken_anew_while_nobody_takes_part(self, lab: Lab) -> None:
         digests = []
         for colour in (1, 2):
-            (lab.folder / "a.png").write_bytes(_picture(colour))
+            (lab.folder / "a.png").write_bytes(png(colour))
             lab.apply(stimuli=_own_files("a.png"))
             with lab.database.read() as session:
                 digests.append({one.clip.digest for one in studies.find(session, "mini").stimuli})
         assert not digests[0] & digests[1]
         lab.rater()
-        (lab.folder / "a.png").write_bytes(_picture(3))
+        (lab.folder / "a.png").write_bytes(png(3))
         lab.apply(stimuli=_own_files("a.png"))
         with lab.database.read() as session:
             assert {one.clip.digest for one in studies.find(session, "mini").stimuli} == digests[1]
