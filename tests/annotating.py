@@ -8,8 +8,9 @@ from sqlalchemy import select
 from evaluation.instruments import Item, TextItem
 from lab import Lab, Rater
 from webapp.models import AnnotationRound, Trial
-from webapp.services import rounds, studies
-from webapp.services.rounds import Annotated, RoundOverview
+from webapp.services import annotated, rounds, studies
+from webapp.services.annotated import Annotated
+from webapp.services.rounds import RoundOverview
 
 
 def apply_annotation(
@@ -33,7 +34,7 @@ def annotation_of(lab: Lab) -> Annotated:
     def read(session: Any) -> Annotated | None:
         study = studies.find(session, "mini")
         spec = studies.spec_of(study)
-        return rounds.annotated(session, study, spec, spec.all_parts[0])
+        return annotated.annotated(session, study, spec, spec.all_parts[0])
 
     found = lab.see(read)
     assert found is not None

@@ -14,7 +14,7 @@ _LONGEST_S = 600
 
 
 class UnplayableError(Exception):
-    """A file cannot be shown; the message says why, as the end of a sentence."""
+    """A file cannot be shown; the message says why."""
 
 
 def duration_s(path: Path) -> float | None:

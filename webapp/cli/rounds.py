@@ -10,7 +10,7 @@ from evaluation.annotation.published import MTAP_PAIRWISE_R, MTAP_RATERS, MTAP_S
 from evaluation.statistics import wording
 from evaluation.study import Part
 from webapp.cli.context import echo_json, open_database
-from webapp.services import audit, studies
+from webapp.services import annotated, audit, studies
 from webapp.services import rounds as annotation_rounds
 from webapp.services.rounds import RoundOverview
 
@@ -36,7 +36,7 @@ def show(slug: str, as_json: bool) -> None:
         parts = annotation_rounds.annotated_parts(spec)
         overall = {}
         for part in parts:
-            found = annotation_rounds.annotated(session, study, spec, part)
+            found = annotated.annotated(session, study, spec, part)
             overall[part.name] = _figures(found.agreement()) if found is not None else None
     if as_json:
         echo_json(_document(lines, overall))

@@ -44,8 +44,8 @@ def trial(slug: str) -> Response | str:
         if participant is None or participant.completed_at is not None:
             return go("debrief", slug)
         spec = studies.spec_of(participant.study)
-        page = not_now(db, participant, spec, participant.study)
         current = trials.current(db, participant)
+        page = not_now(participant, current)
         if page is not None or current is None:
             return page or go("debrief", slug)
         if _begins_part(spec, current) and session.get(f"part_{slug}") != current.part:

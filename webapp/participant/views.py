@@ -4,12 +4,11 @@ from typing import Any
 from urllib.parse import quote
 
 from flask import Blueprint, redirect, render_template, request, session, url_for
-from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response
 
 from evaluation.study import StudySpec
 from webapp import locale
-from webapp.models import Participant, Study, StudyState
+from webapp.models import Participant, Study, StudyState, Trial
 from webapp.models.columns import now
 from webapp.participant import identity
 from webapp.parts import parts
@@ -140,13 +139,23 @@ def instructions(slug: str) -> Response | str:
         )
 
 
-def not_now(db: Session, participant: Participant, spec: StudySpec, study: Study) -> str | None:
-    """Return the page that says why there is nothing to do now; None if there is."""
+def not_now(participant: Participant, current: Trial | None) -> str | None:
+    """Return the page that says why there is nothing to do now; None if there is.
+
+    Parameters
+    ----------
+    participant : Participant
+        Who is at the browser.
+    current : Trial or None
+        Their first trial without an answer.
+    """
+    study = participant.study
+    spec = studies.spec_of(study)
     if participant.opens_at is not None and participant.opens_at > now():
         part = spec.all_parts[participant.part]
         link = url_for("participant.resume", slug=study.slug, token=participant.token, _external=True)
         return study_page("later.html", spec, study, opens_at=participant.opens_at, part=part, personal_link=link)
-    if trials.current(db, participant) is None:
+    if current is None:
         return study_page("between_rounds.html", spec, study)
     return None
 

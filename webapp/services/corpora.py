@@ -34,7 +34,7 @@ from webapp.db import Database
 from webapp.errors import ConflictError, NotFoundError
 from webapp.media import MediaStore
 from webapp.models import Clip, Study
-from webapp.services import results, rounds, studies
+from webapp.services import annotated, results, studies
 
 Floats = NDArray[np.float64]
 
@@ -212,7 +212,7 @@ def _scored(session: Session, spec: StudySpec, part: Part) -> _Rated:
 
 def _annotated(session: Session, study: Study, spec: StudySpec, part: Part) -> _Rated:
     """Return what the rounds of a part have come to: means over rounds, then over raters."""
-    found = rounds.annotated(session, study, spec, part)
+    found = annotated.annotated(session, study, spec, part)
     if found is None or not len(found.values):
         return _Rated({}, 0, None)
     columns = [found.dimensions.index(dimension) for dimension in DIMENSIONS]

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from evaluation.screening import ScreeningReport
 from evaluation.study import StudySpec
 from webapp.models import Condition, Participant, PlaybackEvent, Stimulus, Study, Trial
-from webapp.services import audit, rounds
+from webapp.services import annotated, audit, rounds
 
 PARTICIPANT_COLUMNS = {
     "participant": "number of the participant, counted from 1 in the order of enrolment",
@@ -153,7 +153,7 @@ def annotation(session: Session, study: Study, spec: StudySpec) -> pd.DataFrame:
     )
     rows = []
     for part in rounds.annotated_parts(spec):
-        found = rounds.annotated(session, study, spec, part)
+        found = annotated.annotated(session, study, spec, part)
         if found is None:
             continue
         by_word = any(spec.instrument(use.use).per == "word" for use in part.instruments)

@@ -114,10 +114,9 @@ def _contents(spec: StudySpec, text: str, settings: Settings, folder: Path | Non
         for cell, clip in made.items()
     }
     store = MediaStore(settings.media_url) if files else None
-    for cell, path in files.items():
+    for cell, (path, length) in files.items():
         digest = store.add_file(path) if store is not None else ""
         suffix = path.suffix.lower().removeprefix(".")
-        length = media_check.duration_s(path)
         found[cell] = _Content(digest, {"file": path.name}, suffix, path.stat().st_size, length)
     return {cell: found[cell] for cell in spec.cells()}
 
@@ -135,38 +134,37 @@ def _words(spec: StudySpec) -> dict[str, list[str]]:
 
 def media_files(
     spec: StudySpec, text: str, *, source: str = "study file", folder: Path | None = None
-) -> dict[Cell, Path]:
-    """Return the file of each cell that shows one of the experimenter's own.
+) -> dict[Cell, tuple[Path, float | None]]:
+    """Return the file of each cell that shows one of the experimenter's own, and its length.
+
+    Returns
+    -------
+    dict
+        Cell to the path and the seconds that the file plays, None for a picture.
 
     Raises
     ------
     StudyFileError
-        If a file is not there or of a kind that browsers do not show; the message names line and field.
+        If a file is not there, or is none that browsers show; the message names line and field.
     """
-    found: dict[Cell, Path] = {}
+    read: dict[str, float | None] = {}
+    found: dict[Cell, tuple[Path, float | None]] = {}
     faults: dict[int, str] = {}
     places = {stimulus.id: k for k, stimulus in enumerate(spec.stimuli)}
     for cell in spec.cells():
-        name = spec.stimulus(cell.stimulus).media
-        if name is None:
+        named = spec.stimulus(cell.stimulus).media
+        if named is None:
             continue
-        path = (folder or Path()) / name.replace("{condition}", cell.condition)
-        if path.suffix.lower().removeprefix(".") not in MEDIA:
-            fault = f"{path.name} is not a file that is shown; right is one that ends in {', '.join(MEDIA)}."
-        elif Path(name).is_absolute() or ".." in Path(name).parts:
-            # A study file of somebody else must not publish what lies anywhere on this computer.
-            fault = f"{name} leads out of the study file's folder; right is a file beside it, or in a folder there."
-        elif not path.is_file():
-            fault = f"there is no file {name.replace('{condition}', cell.condition)} beside the study file."
-        else:
-            try:
-                media_check.duration_s(path)
-            except UnplayableError as error:
-                fault = f"the file {name.replace('{condition}', cell.condition)} {error}."
-            else:
-                found[cell] = path
-                continue
-        faults.setdefault(places[cell.stimulus], fault)
+        name = named.replace("{condition}", cell.condition)
+        path = (folder or Path()) / name
+        try:
+            # A file that several cells show is read once.
+            length = read[name] if name in read else _length_of(name, path)
+        except UnplayableError as error:
+            faults.setdefault(places[cell.stimulus], str(error))
+            continue
+        read[name] = length
+        found[cell] = path, length
     if faults:
         located = located_yaml.parse(text, source=source)
         paths: list[tuple[tuple[str | int, ...], str]] = [(("stimuli", k, "media"), why) for k, why in faults.items()]
@@ -174,6 +172,23 @@ def media_files(
             source, [Problem(located.line(path), located_yaml.field_name(path), why) for path, why in paths]
         )
     return found
+
+
+def _length_of(name: str, path: Path) -> float | None:
+    """Return how many seconds a file plays; UnplayableError with a whole sentence if it cannot be shown."""
+    if path.suffix.lower().removeprefix(".") not in MEDIA:
+        raise UnplayableError(f"{path.name} is not a file that is shown; right is one that ends in {', '.join(MEDIA)}.")
+    if Path(name).is_absolute() or ".." in Path(name).parts:
+        # A study file of somebody else must not publish what lies anywhere on this computer.
+        raise UnplayableError(
+            f"{name} leads out of the study file's folder; right is a file beside it, or in a folder there."
+        )
+    if not path.is_file():
+        raise UnplayableError(f"there is no file {name} beside the study file.")
+    try:
+        return media_check.duration_s(path)
+    except UnplayableError as error:
+        raise UnplayableError(f"the file {name} {error}.") from error
 
 
 def clip_specs(spec: StudySpec, text: str, *, source: str = "study file") -> dict[Cell, ClipSpec]:

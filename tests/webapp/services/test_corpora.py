@@ -19,7 +19,7 @@ from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import ConflictError, DatabaseError, NotFoundError
 from webapp.models import Stimulus
-from webapp.services import corpora, rounds, studies
+from webapp.services import annotated, corpora, studies
 from webapp.services.corpora import Corpus
 from webapp.services.modelling import ModelReport
 
@@ -217,7 +217,7 @@ def test_an_annotated_study_gives_what_its_rounds_came_to(
     samples = corpora.load("study:rounds", settings, seed=0).samples
     with database.read() as session:
         study = studies.find(session, "rounds")
-        found = rounds.annotated(session, study, spec, spec.part("faces"))
+        found = annotated.annotated(session, study, spec, spec.part("faces"))
         names = [session.get_one(Stimulus, key).name for key, _ in found.stimuli]
     assert len(samples.pad) == 10
     assert "mean over 3 raters" in samples.note
