@@ -55,6 +55,8 @@ class ScreeningData:
     ranges : pandas.DataFrame
         A row for each item that may be part of a straight line: its lowest and its highest answer. Items without a row
         (choices, free text) are not looked at.
+    raters : tuple of str or int
+        Participants who are to be in the report even if no table tells of them.
 
     Raises
     ------
@@ -69,6 +71,7 @@ class ScreeningData:
     timing: pd.DataFrame = field(default_factory=lambda: _empty("timing"))
     answers: pd.DataFrame = field(default_factory=lambda: _empty("answers"))
     ranges: pd.DataFrame = field(default_factory=lambda: _empty("ranges"))
+    raters: tuple[Participant, ...] = ()
 
     def __post_init__(self) -> None:
         for name, columns in COLUMNS.items():
@@ -83,7 +86,7 @@ class ScreeningData:
     def participants(self) -> tuple[Participant, ...]:
         """Everybody of whom anything is known, in the order of their names."""
         tables = (self.scores, self.repeats, self.checks, self.timing, self.answers)
-        return ordered({one for table in tables for one in table["participant"].unique().tolist()})
+        return ordered({*self.raters, *(one for table in tables for one in table["participant"].unique().tolist())})
 
 
 def ordered(participants: set[Participant]) -> tuple[Participant, ...]:

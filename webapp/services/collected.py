@@ -1,35 +1,24 @@
-"""What was collected, row by row: every counting answer, and every trial."""
+"""What was collected: every counting answer."""
 
+import json
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+import numpy.typing as npt
 import pandas as pd
-from sqlalchemy import func, select
+from sqlalchemy import Text, cast, select
 from sqlalchemy.orm import Session
 
 from evaluation.annotation.discussion import DISCUSSION
 from evaluation.instruments import Instrument
 from evaluation.study import StudySpec
-from webapp.models import (
-    AnnotationRound,
-    Clip,
-    Condition,
-    Participant,
-    PlaybackEvent,
-    Response,
-    Stimulus,
-    Study,
-    Trial,
-    TrialStimulus,
-)
+from webapp.models import Participant, Response, Study, Trial
 from webapp.services import studies
+from webapp.services.trial_table import TRIAL_COLUMNS, Ints, TrialTable, read_trials, whole
 
 ANSWER_COLUMNS = {
-    "participant": "number of the participant, counted from 1 in the order of enrolment",
-    "part": "name of the part of the study",
-    "trial": "place of the trial in the participant's order, counted from 1 over all parts",
-    "kind": "what the trial is for; only those of the kind rating count",
-    "round": "round of annotation, counted from 1; empty if there are none",
+    **{name: TRIAL_COLUMNS[name] for name in ("participant", "part", "trial", "kind", "round")},
     "stimulus": "id of the stimulus in the study file; empty if nothing is shown",
     "condition": "name of the condition in the study file; empty if nothing is shown",
     "clip": "place of the clip on the page that the answer is about, counted from 1; the first of a question about all",
@@ -43,63 +32,7 @@ ANSWER_COLUMNS = {
 }
 """The columns of `answers` and what they mean."""
 
-TRIAL_COLUMNS = {
-    "participant": ANSWER_COLUMNS["participant"],
-    "part": ANSWER_COLUMNS["part"],
-    "trial": ANSWER_COLUMNS["trial"],
-    "kind": ANSWER_COLUMNS["kind"],
-    "round": ANSWER_COLUMNS["round"],
-    "repeats": "which trial of the participant it repeats; empty if none",
-    "stimulus": "what was shown; empty if nothing is",
-    "condition": "in which condition; several that were shown together are joined with ;",
-    "clip": "sha-256 of all that made the clip, which leads to its lineage in the media store; several joined with ;",
-    "language": "language of the pages",
-    "state": "answered, shown or waiting",
-    "consented_at": "when the participant agreed (UTC)",
-    "shown_at": "when the trial was first on the screen (UTC); empty if not yet",
-    "answered_at": "when its answers were stored (UTC); empty if not yet",
-    "seconds": "time between the two",
-    "watched": "share of the clip that was played, of several the smallest; empty if nothing plays",
-    "plays": "how often a clip was played to its end",
-}
-"""The columns of `trials` and what they mean."""
-
-_WHOLE = ("round", "clip", "word", "place", "repeats")
-
-
-class Shown(NamedTuple):
-    """A stimulus in a condition, and the digest of its clip."""
-
-    stimulus: str
-    condition: str
-    clip: str
-
-
-class Collected(NamedTuple):
-    """One answer with all that is known of it; `ANSWER_COLUMNS` describes the fields but the last.
-
-    Attributes
-    ----------
-    conditions : tuple of str
-        The conditions of all clips that the trial shows, in the order of the page.
-    """
-
-    participant: int
-    part: str
-    trial: int
-    kind: str
-    round: int | None
-    stimulus: str | None
-    condition: str | None
-    clip: int | None
-    instrument: str
-    item: str
-    word: int | None
-    raw: Any
-    flipped: bool
-    place: int | None
-    keyed: Any
-    conditions: tuple[str, ...]
+_BATCH = 50_000
 
 
 def answers(session: Session, slug: str) -> pd.DataFrame:
@@ -118,79 +51,64 @@ def answers(session: Session, slug: str) -> pd.DataFrame:
     return as_frame(read(session, studies.find(session, slug)))
 
 
-def as_frame(rows: list[Collected]) -> pd.DataFrame:
-    """Return answers as the table that `answers` describes."""
-    frame = pd.DataFrame(rows, columns=list(Collected._fields))[list(ANSWER_COLUMNS)]
-    return _typed(frame).astype({"flipped": bool, "raw": object, "keyed": object})
+def as_frame(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return answers, as `read` returns them, as the table that `answers` describes."""
+    table = rows[list(ANSWER_COLUMNS)]
+    return table.astype({column: object for column in table if isinstance(table[column].dtype, pd.CategoricalDtype)})
 
 
-def read(session: Session, study: Study) -> list[Collected]:
-    """Return all counting answers of a study, by participant and trial."""
+def read(session: Session, study: Study) -> pd.DataFrame:
+    """Return all counting answers of a study, by participant and trial, in a form that stays small for millions.
+
+    Pages that were answered alike are read once, and names are categories.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The columns `ANSWER_COLUMNS`, names as categories; then `shown`, the number of clips that the trial shows, and
+        `conditions`, a tuple of their conditions in the order of the page.
+    """
     spec = studies.spec_of(study)
-    shown = _shown(session, study)
-    instruments: dict[str, Instrument] = {}
-    rows = session.execute(
-        select(
-            Participant.number,
-            Trial.id,
-            Trial.part,
-            Trial.position,
-            Trial.kind,
-            AnnotationRound.number,
-            Response.instrument,
-            Response.answers,
-            Response.raw,
-            Response.display,
-        )
-        .select_from(Response)
-        .join(Trial, Response.trial_id == Trial.id)
-        .join(Participant, Trial.participant_id == Participant.id)
-        .outerjoin(AnnotationRound, Trial.round_id == AnnotationRound.id)
-        .where(Participant.study_id == study.id)
-        .order_by(Participant.number, Trial.position, Response.revision, Response.id)
-    )
-    # Later revisions come later and replace the earlier ones.
-    counting = {(row[1], row[6]): row for row in rows}
-    found = []
-    for number, key, part, position, kind, round_number, name, keyed, raw, display in counting.values():
-        if name not in instruments:
-            instruments[name] = _instrument(spec, name)
-        trial = (number + 1, part, position, kind, None if round_number is None else round_number + 1)
-        page = _Page(instruments[name], keyed, raw, display)
-        found += [Collected(*trial, *one) for one in page.rows(shown.get(key, []))]
-    return found
+    trials = read_trials(session, study)
+    given = _read_pages(session, study, spec)
+    place = np.searchsorted(trials.key, given.trial)
+    order = _counting(given, trials.participant[place], trials.position[place])
+    return _table(given.pages, given.page[order], place[order], trials)
+
+
+class _Given(NamedTuple):
+    """Answers to one instrument in one trial: arrays with an entry for each revision, and the different pages."""
+
+    trial: Ints
+    instrument: Ints
+    revision: Ints
+    page: Ints
+    pages: list["_Page"]
 
 
 class _Page(NamedTuple):
-    """The answers to one instrument in one trial."""
+    """The answers to one instrument on one page."""
 
     instrument: Instrument
     keyed: Mapping[str, Any]
-    raw: Mapping[str, Any] | None
-    display: Mapping[str, Any] | None
+    raw: Mapping[str, Any]
+    display: Mapping[str, Any]
 
-    def rows(self, shown: list[Shown]) -> Iterator[tuple[Any, ...]]:
-        """Yield the fields of `Collected` from the stimulus on, in the order of clips or words, then of items."""
-        raw, display = self.raw or {}, self.display or {}
-        order = {item: place for place, item in enumerate(display.get("order", ()), start=1)}
+    def rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield clip, item, word, raw, flipped, place and keyed, in the order of clips or words, then of items."""
+        order = {item: place for place, item in enumerate(self.display.get("order", ()), start=1)}
         items = {item.id: place for place, item in enumerate(self.instrument.items)}
         split = {key: self._split(key) for key in self.keyed}
         for key in sorted(self.keyed, key=lambda key: (split[key][1], items.get(split[key][0], len(items)))):
             item, place = split[key]
-            clip = place if self.instrument.per == "clip" else 1
-            cell = shown[clip - 1] if clip <= len(shown) else None
             yield (
-                cell.stimulus if cell else None,
-                cell.condition if cell else None,
-                clip if shown else None,
-                self.instrument.name,
+                place if self.instrument.per == "clip" else 1,
                 item,
                 place if self.instrument.per == "word" else None,
-                _plain(raw.get(key, self.keyed[key])),
-                key in display.get("flipped", ()),
+                _plain(self.raw.get(key, self.keyed[key])),
+                key in self.display.get("flipped", ()),
                 order.get(key),
                 _plain(self.keyed[key]),
-                tuple(one.condition for one in shown),
             )
 
     def _split(self, key: str) -> tuple[str, int]:
@@ -204,106 +122,103 @@ def _plain(answer: Any) -> Any:
     return tuple(answer) if isinstance(answer, list) else answer
 
 
+def _read_pages(session: Session, study: Study, spec: StudySpec) -> _Given:
+    """Read all answers, each different page once; texts are compared as they are stored."""
+    result = session.execute(
+        select(
+            Response.trial_id,
+            Response.revision,
+            Response.instrument,
+            cast(Response.answers, Text),
+            cast(Response.raw, Text),
+            cast(Response.display, Text),
+        )
+        .join(Trial, Response.trial_id == Trial.id)
+        .join(Participant, Trial.participant_id == Participant.id)
+        .where(Participant.study_id == study.id)
+        .order_by(Response.id)
+    )
+    instruments: dict[str, int] = {}
+    known: dict[tuple[str, ...], int] = {}
+    parts: list[Ints] = [np.empty((4, 0), dtype=np.int64)]
+    for batch in result.partitions(_BATCH):
+        columns = list(zip(*batch, strict=True))
+        trial, revision, names = columns[:3]
+        page = [known.setdefault(texts, len(known)) for texts in zip(*columns[2:], strict=True)]
+        asked = [instruments.setdefault(one, len(instruments)) for one in names]
+        parts.append(np.array([trial, asked, revision, page], dtype=np.int64))
+    named = {name: _instrument(spec, name) for name in instruments}
+    pages = []
+    for name, *texts in known:
+        keyed, raw, display = (json.loads(text or "null") or {} for text in texts)
+        pages.append(_Page(named[name], keyed, raw, display))
+    trials, asked_in, revisions, page_of = np.concatenate(parts, axis=1)
+    return _Given(trials, asked_in, revisions, page_of, pages)
+
+
 def _instrument(spec: StudySpec, name: str) -> Instrument:
     own = {definition.name for definition in spec.own_instruments}
     return DISCUSSION if name == DISCUSSION.name and name not in own else spec.instrument(name)
 
 
-def _shown(session: Session, study: Study) -> dict[int, list[Shown]]:
-    """Return what each trial of a study shows, in the order of the page."""
-    stimuli = {
-        key: Shown(stimulus, condition, digest)
-        for key, stimulus, condition, digest in session.execute(
-            select(Stimulus.id, Stimulus.name, Condition.name, Clip.digest)
-            .join(Condition, Stimulus.condition_id == Condition.id)
-            .join(Clip, Stimulus.clip_id == Clip.id)
-            .where(Stimulus.study_id == study.id)
-        )
-    }
-    first = (
-        select(Trial.id, Trial.stimulus_id)
-        .join(Participant, Trial.participant_id == Participant.id)
-        .where(Participant.study_id == study.id)
+def _counting(given: _Given, participant: Ints, position: Ints) -> Ints:
+    """Return where the last revision of each page is, by participant and trial, then as first answered."""
+    order = np.lexsort((given.revision, position, participant))
+    # Pages of one trial are next to each other now; a later revision of one comes later and replaces the earlier.
+    key = given.trial[order] * (int(given.instrument.max(initial=0)) + 1) + given.instrument[order]
+    _, first = np.unique(key, return_index=True)
+    _, last = np.unique(key[::-1], return_index=True)
+    counting: Ints = order[len(key) - 1 - last[np.argsort(first)]]
+    return counting
+
+
+def _table(pages: list[_Page], page: Ints, place: Ints, trials: TrialTable) -> pd.DataFrame:
+    """Return a row for each item of each page; `place` tells the trial of each page."""
+    rows = [list(one.rows()) for one in pages]
+    length = np.array([len(one) for one in rows], dtype=np.int64)
+    begin, times = np.cumsum(length) - length, length[page]
+    # For each row of the table: which page it belongs to, and which of the different rows it is.
+    owner = np.repeat(place, times)
+    row = np.arange(len(owner)) + np.repeat(begin[page] - (np.cumsum(times) - times), times)
+    clip, item, word, raw, flipped, where, keyed = _columns(rows)
+    number = np.array(clip, dtype=np.int64)[row]
+    shown = trials.shown[trials.pages[owner]]
+    cell = trials.cell(owner, number)
+    names = pd.Categorical([one.instrument.name for one in pages])
+    return pd.DataFrame(
+        {
+            "participant": trials.participant[owner],
+            "part": trials.part[owner],
+            "trial": trials.position[owner],
+            "kind": trials.kind[owner],
+            "round": whole(trials.round[owner], trials.round[owner] > 0),
+            "stimulus": trials.stimuli[cell],
+            "condition": trials.conditions[cell],
+            "clip": whole(number, shown > 0),
+            "instrument": names[np.repeat(page, times)],
+            "item": pd.Categorical(item)[row],
+            "word": pd.array(word, dtype="Int64")[row],
+            "raw": _objects(raw)[row],
+            "flipped": np.array(flipped, dtype=bool)[row],
+            "place": pd.array(where, dtype="Int64")[row],
+            "keyed": _objects(keyed)[row],
+            "shown": shown,
+            "conditions": trials.conditions_of_pages()[trials.pages[owner]],
+        }
     )
-    shown = {trial: [stimuli[key]] for trial, key in session.execute(first) if key is not None}
-    beside = (
-        select(TrialStimulus.trial_id, TrialStimulus.stimulus_id)
-        .join(Stimulus, TrialStimulus.stimulus_id == Stimulus.id)
-        .where(Stimulus.study_id == study.id)
-        .order_by(TrialStimulus.trial_id, TrialStimulus.place)
-    )
-    for trial, key in session.execute(beside):
-        shown[trial].append(stimuli[key])
-    return shown
 
 
-def trials(session: Session, slug: str) -> pd.DataFrame:
-    """Return one row for each trial: what was shown, when, and how much of it was played.
-
-    Returns
-    -------
-    pandas.DataFrame
-        The columns `TRIAL_COLUMNS`.
-
-    Raises
-    ------
-    NotFoundError
-        If there is no such study.
-    """
-    study = studies.find(session, slug)
-    shown, plays = _shown(session, study), _plays(session, study)
-    rows = session.execute(
-        select(Trial, Participant, AnnotationRound.number)
-        .join(Participant, Trial.participant_id == Participant.id)
-        .outerjoin(AnnotationRound, Trial.round_id == AnnotationRound.id)
-        .where(Participant.study_id == study.id)
-        .order_by(Participant.number, Trial.position)
-    )
-    records = []
-    for trial, participant, round_number in rows:
-        cells = shown.get(trial.id, [])
-        records.append(
-            {
-                "participant": participant.number + 1,
-                "part": trial.part,
-                "trial": trial.position,
-                "kind": trial.kind,
-                "round": None if round_number is None else round_number + 1,
-                "repeats": trial.repeats,
-                "stimulus": cells[0].stimulus if cells else None,
-                "condition": ";".join(cell.condition for cell in cells) or None,
-                "clip": ";".join(cell.clip for cell in cells) or None,
-                "language": participant.language,
-                "state": "answered" if trial.answered_at else "shown" if trial.shown_at else "waiting",
-                "consented_at": participant.consented_at,
-                "shown_at": trial.shown_at,
-                "answered_at": trial.answered_at,
-                "seconds": _seconds(trial),
-                "watched": trial.watched,
-                "plays": plays.get(trial.id, 0),
-            }
-        )
-    frame = pd.DataFrame(records, columns=list(TRIAL_COLUMNS))
-    return _typed(frame, but="clip").astype({"seconds": float, "watched": float})
+def _columns(rows: list[list[tuple[Any, ...]]]) -> list[list[Any]]:
+    columns: list[list[Any]] = [[], [], [], [], [], [], []]
+    for one in rows:
+        for entry in one:
+            for column, value in zip(columns, entry, strict=True):
+                column.append(value)
+    return columns
 
 
-def _seconds(trial: Trial) -> float | None:
-    if trial.shown_at is None or trial.answered_at is None:
-        return None
-    return (trial.answered_at - trial.shown_at).total_seconds()
-
-
-def _plays(session: Session, study: Study) -> dict[int, int]:
-    ended = (
-        select(PlaybackEvent.trial_id, func.count(PlaybackEvent.id))
-        .join(Trial, Trial.id == PlaybackEvent.trial_id)
-        .join(Participant, Participant.id == Trial.participant_id)
-        .where(Participant.study_id == study.id, PlaybackEvent.kind == "ended")
-        .group_by(PlaybackEvent.trial_id)
-    )
-    return dict(session.execute(ended).all())
-
-
-def _typed(frame: pd.DataFrame, *, but: str = "") -> pd.DataFrame:
-    """Return a frame whose whole numbers stay whole where some are missing."""
-    return frame.astype({column: "Int64" for column in _WHOLE if column in frame and column != but})
+def _objects(values: list[Any]) -> npt.NDArray[np.object_]:
+    found = np.empty(len(values), dtype=object)
+    for place, value in enumerate(values):
+        found[place] = value
+    return found

@@ -13,7 +13,7 @@ from evaluation.report import export
 from evaluation.responses import DIMENSIONS
 from evaluation.study import StudySpec
 from webapp.errors import ConfigError
-from webapp.services import collected, export_tables, raters, studies
+from webapp.services import collected, export_tables, raters, studies, trial_table
 from webapp.services.counting import statistics_frame
 
 SCORE_COLUMNS = MappingProxyType(
@@ -33,7 +33,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "responses": collected.ANSWER_COLUMNS,
         "scores": SCORE_COLUMNS,
-        "trials": collected.TRIAL_COLUMNS,
+        "trials": trial_table.TRIAL_COLUMNS,
         "participants": export_tables.PARTICIPANT_COLUMNS,
         "playback": export_tables.PLAYBACK_COLUMNS,
         "annotation": export_tables.ANNOTATION_COLUMNS,
@@ -76,7 +76,7 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
     tables = {
         "responses": _responses(spec, collected.as_frame(rows)),
         "scores": _scores(spec, rows),
-        "trials": collected.trials(session, slug),
+        "trials": trial_table.trials(session, slug),
         "participants": export_tables.participants(session, study, screenings),
     }
     if spec.share.playback:
@@ -107,7 +107,7 @@ def _joined(answer: object) -> object:
     return ";".join(map(str, answer)) if isinstance(answer, tuple) else answer
 
 
-def _scores(spec: StudySpec, rows: list[collected.Collected]) -> pd.DataFrame:
+def _scores(spec: StudySpec, rows: pd.DataFrame) -> pd.DataFrame:
     tables = []
     for part in spec.all_parts:
         own = spec if spec.parts is None else spec.only(part.name)

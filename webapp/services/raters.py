@@ -14,8 +14,7 @@ from evaluation.screening import ScreeningData, ScreeningReport, screen
 from evaluation.screening.report import GATES, Gate
 from evaluation.study import StudySpec
 from webapp.models import Decision, Participant, Study, Trial
-from webapp.services import collected, studies
-from webapp.services.collected import Collected
+from webapp.services import collected, studies, trial_table
 from webapp.services.counting import COUNTING, statistics_frame
 
 CHECK_COLUMNS = ("participant", "part", "trial", "kind", "passed")
@@ -23,6 +22,8 @@ REPEAT_COLUMNS = ("participant", "trial", "of", "clip", "instrument", "score", "
 TIMING_COLUMNS = ("participant", "part", "trial", "kind", "seconds", "watched")
 
 _KEY = ["participant", "trial", "clip"]
+_CHECKING = ("training", "gold", "instructed")
+_OF_SCORES = ("variance", "z_score", "kurtosis", "bias", "inconsistency", "correlation")
 
 
 def checks(session: Session, slug: str, part: str | None = None) -> pd.DataFrame:
@@ -44,7 +45,7 @@ def checks(session: Session, slug: str, part: str | None = None) -> pd.DataFrame
     return _checks(session, study, collected.read(session, study), part)
 
 
-def _checks(session: Session, study: Study, rows: Sequence[Collected], part: str | None) -> pd.DataFrame:
+def _checks(session: Session, study: Study, rows: pd.DataFrame, part: str | None) -> pd.DataFrame:
     spec = studies.spec_of(study)
     places = session.execute(
         select(Participant.number, Trial.position, Trial.check_place)
@@ -53,31 +54,28 @@ def _checks(session: Session, study: Study, rows: Sequence[Collected], part: str
         .order_by(Participant.number, Trial.position)
     )
     known = {(number + 1, position): place for number, position, place in places}
-    given: dict[tuple[int, int], list[Collected]] = {key: [] for key in known}
-    for one in rows:
-        if (one.participant, one.trial) in given:
-            given[one.participant, one.trial].append(one)
+    checking = rows if part is None else rows[rows["part"] == part]
+    checking = checking[checking["kind"].isin(_CHECKING)]
     found = []
-    for (participant, position), own in given.items():
-        if not own or (part is not None and own[0].part != part):
-            continue
-        accept = accepted(spec.part(own[0].part), own[0].kind, known[participant, position])
+    for _, own in checking.groupby(["participant", "trial"], sort=True):
+        participant, position = (int(one) for one in own[["participant", "trial"]].iloc[0])
+        about, kind = str(own["part"].iloc[0]), str(own["kind"].iloc[0])
+        accept = accepted(spec.part(about), kind, known.get((participant, position)))
         if accept:
-            passed = all(passes(accept, about) for about in _by_place(own))
-            found.append((participant, own[0].part, position, own[0].kind, passed))
+            found.append((participant, about, position, kind, all(passes(accept, one) for one in _by_place(own))))
     return pd.DataFrame(found, columns=list(CHECK_COLUMNS)).astype({"passed": bool})
 
 
-def _by_place(rows: Sequence[Collected]) -> list[dict[str, dict[str, object]]]:
+def _by_place(rows: pd.DataFrame) -> list[dict[str, dict[str, object]]]:
     """Return the answers of a trial as known answers name them: for each word, if it asks about words."""
-    words: list[int | None] = [*sorted({one.word for one in rows if one.word is not None})]
+    spoken = rows["word"].dropna().unique().tolist()
     places: list[dict[str, dict[str, object]]] = []
-    for word in words or [None]:
+    for word in sorted(spoken) or [None]:
         about: dict[str, dict[str, object]] = {}
-        for one in rows:
-            if one.word in (None, word):
-                single = isinstance(one.keyed, tuple) and len(one.keyed) == 1
-                about.setdefault(one.instrument, {})[one.item] = one.keyed[0] if single else one.keyed
+        own = rows if word is None else rows[rows["word"].isna() | (rows["word"] == word)]
+        for instrument, item, keyed in own[["instrument", "item", "keyed"]].itertuples(index=False):
+            single = isinstance(keyed, tuple) and len(keyed) == 1
+            about.setdefault(instrument, {})[item] = keyed[0] if single else keyed
         places.append(about)
     return places
 
@@ -99,7 +97,7 @@ def repeats(session: Session, slug: str, part: str | None = None) -> pd.DataFram
     return repeats_among(session, study, collected.read(session, study), part)
 
 
-def repeats_among(session: Session, study: Study, rows: Sequence[Collected], part: str | None) -> pd.DataFrame:
+def repeats_among(session: Session, study: Study, rows: pd.DataFrame, part: str | None) -> pd.DataFrame:
     """Return what `repeats` does, from all answers of the study."""
     spec = studies.spec_of(study)
     query = (
@@ -108,10 +106,14 @@ def repeats_among(session: Session, study: Study, rows: Sequence[Collected], par
         .where(Participant.study_id == study.id, Trial.repeats.is_not(None))
     )
     originals = {(number + 1, place): of for number, place, of in session.execute(query) if of is not None}
+    again = {*originals, *((participant, of) for (participant, _), of in originals.items())}
+    keys = zip(rows["participant"].tolist(), rows["trial"].tolist(), strict=True)
+    rows = rows[[key in again for key in keys]] if originals else rows.iloc[:0]
     frame = statistics_frame(spec, rows, part, kinds=(*COUNTING, "repeat"))
     known: dict[tuple[int, int, int, str], float] = {}
     # Two parts may each ask an instrument that has the same score.
-    parts = {(one.participant, one.trial): one.part for one in rows}
+    pages = rows.drop_duplicates(["participant", "trial"])[["participant", "trial", "part"]]
+    parts = {(participant, trial): str(name) for participant, trial, name in pages.itertuples(index=False)}
     owners = {
         (own.name, name): use.use
         for own in spec.all_parts
@@ -147,7 +149,7 @@ def timing(session: Session, slug: str, part: str | None = None) -> pd.DataFrame
     NotFoundError
         If there is no such study.
     """
-    return _timing(collected.trials(session, slug), part)
+    return _timing(trial_table.trials(session, slug), part)
 
 
 def _timing(trials: pd.DataFrame, part: str | None) -> pd.DataFrame:
@@ -176,11 +178,8 @@ def screening(session: Session, slug: str, part: str | None = None) -> Screening
     return screenings(session, study, collected.read(session, study), [name])[name]
 
 
-def screenings(
-    session: Session, study: Study, rows: Sequence[Collected], parts: Sequence[str]
-) -> dict[str, ScreeningReport]:
+def screenings(session: Session, study: Study, rows: pd.DataFrame, parts: Sequence[str]) -> dict[str, ScreeningReport]:
     """Screen the raters of some parts, by their names, from all answers of the study."""
-    trials = collected.trials(session, study.slug)
     made = session.execute(
         select(Participant.number, Decision.gate, Decision.reason)
         .join(Participant, Decision.participant_id == Participant.id)
@@ -188,27 +187,32 @@ def screenings(
     )
     decisions: dict[str | int, tuple[Gate, str]] = {number + 1: (_gate(gate), reason) for number, gate, reason in made}
     screening_rules = studies.spec_of(study).screening
-    return {
-        name: screen(screening_rules, _evidence(session, study, rows, _timing(trials, name), name), decisions=decisions)
-        for name in parts
-    }
+    return {name: screen(screening_rules, _evidence(session, study, rows, name), decisions=decisions) for name in parts}
 
 
-def _evidence(
-    session: Session, study: Study, every: Sequence[Collected], times: pd.DataFrame, name: str
-) -> ScreeningData:
-    """Return what the raters of a part are screened by."""
+def _evidence(session: Session, study: Study, every: pd.DataFrame, name: str) -> ScreeningData:
+    """Return what the raters of a part are screened by: the tables that the study's rules look at."""
     spec = studies.spec_of(study)
-    rows = [one for one in every if one.part == name and one.kind in COUNTING]
-    known = _checks(session, study, every, name)
-    return ScreeningData(
-        scores=_scores(spec, rows, name),
-        repeats=repeats_among(session, study, every, name),
-        checks=known[known["kind"].isin(["gold", "instructed"])],
-        timing=times[times["kind"].isin(COUNTING)].rename(columns={"watched": "share"}),
-        answers=_page_answers(rows),
-        ranges=_ranges(spec, rows),
-    )
+
+    def asked(*rules: str) -> bool:
+        return any(getattr(spec.screening, rule) is not None for rule in rules)
+
+    rows = every[(every["part"] == name) & every["kind"].isin(COUNTING)]
+    tables: dict[str, pd.DataFrame] = {}
+    if asked(*_OF_SCORES):
+        tables["scores"] = _scores(spec, rows, name)
+    if asked("repeats"):
+        tables["repeats"] = repeats_among(session, study, every, name)
+    if asked("gold", "instructed"):
+        known = _checks(session, study, every, name)
+        tables["checks"] = known[known["kind"].isin(["gold", "instructed"])]
+    if asked("watched", "seconds"):
+        times = _timing(trial_table.trials(session, study.slug), name)
+        tables["timing"] = times[times["kind"].isin(COUNTING)].rename(columns={"watched": "share"})
+    if asked("straight_lining"):
+        tables["answers"] = _page_answers(rows)
+        tables["ranges"] = _ranges(spec, rows)
+    return ScreeningData(**tables, raters=tuple(every.loc[every["part"] == name, "participant"].unique().tolist()))
 
 
 def _gate(name: str) -> Gate:
@@ -218,23 +222,19 @@ def _gate(name: str) -> Gate:
     raise DataError(f"A decision names the gate {name!r}; there are {', '.join(GATES)}.")
 
 
-def _scores(spec: StudySpec, rows: Sequence[Collected], part: str) -> pd.DataFrame:
+def _scores(spec: StudySpec, rows: pd.DataFrame, part: str) -> pd.DataFrame:
     """Return all numbers of a part, one in each row; those about a word have the word's number at the stimulus."""
     columns = ["participant", "trial", "stimulus", "condition", "score", "value"]
     wide = score_trials(spec, complete(check_responses(spec, statistics_frame(spec, rows, part))))
     names = [name for one in map(spec.instrument, spec.instrument_names) for name in numbers_of(one) if name in wide]
     long = wide.melt(id_vars=columns[:4], value_vars=list(dict.fromkeys(names)), var_name="score", value_name="value")
-    by_name = {name: spec.instrument(name) for name in {one.instrument for one in rows if one.word is not None}}
-    words: dict[tuple[str, int, int, int], tuple[Collected, dict[str, object]]] = {}
-    for one in rows:
-        if one.word is not None:
-            key = (one.instrument, one.participant, one.trial, one.word)
-            words.setdefault(key, (one, {}))[1][one.item] = one.keyed
-    spoken = [
-        (one.participant, one.trial, f"{one.stimulus}#{one.word}", one.condition, score, value)
-        for one, answers in words.values()
-        for score, value in _word_numbers(by_name[one.instrument], answers)
-    ]
+    spoken = []
+    by_word = rows[rows["word"].notna()].astype({"stimulus": object, "condition": object})
+    for key, own in by_word.groupby(["instrument", "participant", "trial", "word"], observed=True, sort=False):
+        instrument, participant, trial, word = key
+        answers = dict(zip(own["item"], own["keyed"], strict=True))
+        about = (participant, trial, f"{own['stimulus'].iloc[0]}#{word}", own["condition"].iloc[0])
+        spoken += [(*about, *one) for one in _word_numbers(spec.instrument(str(instrument)), answers)]
     return pd.concat([long.dropna(subset=["value"])[columns], pd.DataFrame(spoken, columns=columns)], ignore_index=True)
 
 
@@ -249,23 +249,30 @@ def _word_numbers(instrument: Instrument, answers: dict[str, object]) -> list[tu
     ]
 
 
-def _page_answers(rows: Sequence[Collected]) -> pd.DataFrame:
+def _page_answers(rows: pd.DataFrame) -> pd.DataFrame:
     """Return the answers as they stood on the page; those about each clip are items of their own."""
-    found = [
-        (one.participant, one.trial, one.instrument, f"{one.item}-{one.clip}", one.raw)
-        for one in rows
-        if one.word is None and isinstance(one.raw, int)
-    ]
-    return pd.DataFrame(found, columns=["participant", "trial", "instrument", "item", "value"])
+    own = _numeric(rows)
+    return pd.DataFrame(
+        {
+            "participant": own["participant"],
+            "trial": own["trial"],
+            "instrument": own["instrument"].astype(object),
+            "item": own["item"].astype(str) + "-" + own["clip"].astype(str),
+            "value": own["raw"].astype(int),
+        }
+    )
 
 
-def _ranges(spec: StudySpec, rows: Sequence[Collected]) -> pd.DataFrame:
+def _numeric(rows: pd.DataFrame) -> pd.DataFrame:
+    return rows[rows["word"].isna() & rows["raw"].map(lambda raw: isinstance(raw, int)).astype(bool)]
+
+
+def _ranges(spec: StudySpec, rows: pd.DataFrame) -> pd.DataFrame:
     """Return the ranges of items that may make a straight line; most words of a sentence are rightly alike."""
-    instruments = {name: spec.instrument(name) for name in {one.instrument for one in rows if one.word is None}}
-    asked = {(one.instrument, one.item, one.clip) for one in rows if one.word is None and isinstance(one.raw, int)}
+    asked = _numeric(rows)[["instrument", "item", "clip"]].drop_duplicates().astype({"instrument": str, "item": str})
     found = []
-    for name, item_id, clip in sorted(asked, key=str):
-        item = next(item for item in instruments[name].items if item.id == item_id)
+    for name, item_id, clip in sorted(asked.itertuples(index=False), key=str):
+        item = next(item for item in spec.instrument(name).items if item.id == item_id)
         if item.numeric and not isinstance(item, ChoiceItem):
             found.append((name, f"{item_id}-{clip}", min(item.values), max(item.values)))
     return pd.DataFrame(found, columns=["instrument", "item", "low", "high"])

@@ -10,7 +10,7 @@ from evaluation.report.analysis import StudyReport, analyse
 from evaluation.study import StudySpec
 from webapp.errors import NotFoundError
 from webapp.services import collected, studies
-from webapp.services.collected import ANSWER_COLUMNS, TRIAL_COLUMNS, answers, trials
+from webapp.services.collected import ANSWER_COLUMNS, answers
 from webapp.services.counting import PREFERENCE_COLUMNS, preferences_frame, statistics_frame
 from webapp.services.raters import (
     CHECK_COLUMNS,
@@ -23,6 +23,7 @@ from webapp.services.raters import (
     screenings,
     timing,
 )
+from webapp.services.trial_table import TRIAL_COLUMNS, trials
 
 __all__ = [
     "ANSWER_COLUMNS",
