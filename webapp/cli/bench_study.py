@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from statistics import median
@@ -10,27 +9,14 @@ from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
-from sqlalchemy import insert, update
 
 from evaluation import study as study_file
 from evaluation.annotation.rounds import disagreement, most_disputed
 from evaluation.study import StudySpec
+from webapp.cli.bench_database import filled
 from webapp.cli.context import echo_json
 from webapp.db import Database
-from webapp.models import (
-    Clip,
-    ClipStatus,
-    Condition,
-    Participant,
-    ParticipantState,
-    Response,
-    Stimulus,
-    Study,
-    StudyState,
-    Trial,
-    Visit,
-)
-from webapp.models.columns import now
+from webapp.models import Study
 from webapp.services import asking, enrolment, trials
 
 SAMPLES, RATERS, DIMENSIONS = 1_000_000, 5, 3
@@ -38,7 +24,6 @@ PARTICIPANTS = 100_000
 FEW = 10
 REPEATS = 5
 ENROLMENTS = 40
-_BATCH = 20_000
 
 
 @click.command()
@@ -117,77 +102,11 @@ def _record_first(database: Database, spec: StudySpec) -> float:
 
 def _filled(path: Path, spec: StudySpec, count: int) -> Database:
     """Return a database in which so many participants have answered a quarter of their trials."""
-    database = Database(f"sqlite:///{path}")
-    database.upgrade()
-    with database.write() as session:
-        found = Study(
-            slug=spec.slug,
-            title="demo",
-            text=study_file.bundled_text("demo"),
-            digest=spec.digest,
-            state=StudyState.OPEN,
-        )
-        found.conditions = [Condition(name=one.name, position=k) for k, one in enumerate(spec.conditions)]
-        by_name = {condition.name: condition for condition in found.conditions}
-        for k, cell in enumerate(spec.cells()):
-            clip = Clip(digest=f"{k:064x}", spec={}, status=ClipStatus.DONE)
-            found.stimuli.append(Stimulus(name=cell.stimulus, condition=by_name[cell.condition], clip=clip))
-        session.add(found)
     each = len(spec.stimuli)
-    for first in range(0, count, _BATCH):
-        _fill(database, range(first, min(first + _BATCH, count)), each)
-    with database.write() as session:
-        session.execute(update(Study).values(enrolled=count, next_slot=count))
-    return database
-
-
-def _fill(database: Database, numbers: range, each: int) -> None:
-    moment = now()
-    people = [
-        {
-            "id": number + 1,
-            "study_id": 1,
-            "number": number,
-            "slot": number,
-            "state": ParticipantState.COMPLETED if number % 2 else ParticipantState.ACTIVE,
-            "token": f"{number:032d}",
-            "language": "en",
-            "part": number % 2,
-            "consented_at": moment,
-            "due_at": moment + timedelta(days=1),
-        }
-        for number in numbers
-    ]
-    pages = [
-        {
-            "participant_id": number + 1,
-            "position": position,
-            "part": "main",
-            "kind": "rating",
-            "stimulus_id": 1 + (number + 3 * position) % 42,
-            "answered_at": moment if position * 4 <= each else None,
-        }
-        for number in numbers
-        for position in range(1, each + 1)
-    ]
-    answered = [
-        {
-            "trial_id": number * each + position,
-            "visit_id": number + 1,
-            "instrument": "mos5",
-            "revision": 1,
-            "answers": {"mos": 3},
-            "submitted_at": moment,
-        }
-        for number in numbers
-        for position in range(1, each // 4 + 1)
-    ]
-    with database.write() as session:
-        session.execute(insert(Participant), people)
-        visits = [{"id": number + 1, "participant_id": number + 1, "started_at": moment} for number in numbers]
-        session.execute(insert(Visit), visits)
-        session.execute(insert(Trial), pages)
-        session.execute(insert(Response), answered)
+    text = study_file.bundled_text("demo")
+    return filled(
+        path, spec, text, people=count, each=each, answered=each // 4, instrument="mos5", answer=lambda *_: {"mos": 3}
+    )
 
 
 def _seconds(work: Callable[[], object]) -> float:

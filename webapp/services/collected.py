@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,9 +14,12 @@ from sqlalchemy.orm import Session
 from evaluation.annotation.discussion import DISCUSSION
 from evaluation.instruments import Instrument
 from evaluation.study import StudySpec
-from webapp.models import Participant, Response, Study, Trial
+from webapp.models import AnnotationRound, Participant, Response, Study, Trial
 from webapp.services import studies
-from webapp.services.trial_table import TRIAL_COLUMNS, Ints, TrialTable, read_trials, whole
+from webapp.services.shown import Shown, shows
+from webapp.services.trial_table import TRIAL_COLUMNS
+
+Ints = npt.NDArray[np.int64]
 
 ANSWER_COLUMNS = {
     **{name: TRIAL_COLUMNS[name] for name in ("participant", "part", "trial", "kind", "round")},
@@ -68,22 +72,45 @@ def read(session: Session, study: Study) -> pd.DataFrame:
         The columns `ANSWER_COLUMNS`, names as categories; then `shown`, the number of clips that the trial shows, and
         `conditions`, a tuple of their conditions in the order of the page.
     """
-    spec = studies.spec_of(study)
-    trials = read_trials(session, study)
-    given = _read_pages(session, study, spec)
-    place = np.searchsorted(trials.key, given.trial)
-    order = _counting(given, trials.participant[place], trials.position[place])
-    return _table(given.pages, given.page[order], place[order], trials)
+    given = _read(session, study)
+    counting = _counting(given)
+    return _table(given, counting)
 
 
 class _Given(NamedTuple):
-    """Answers to one instrument in one trial: arrays with an entry for each revision, and the different pages."""
+    """All answers to one instrument in one trial, in all revisions: arrays with an entry for each.
 
-    trial: Ints
-    instrument: Ints
+    Attributes
+    ----------
+    key, revision, trial, position, participant, instrument : numpy.ndarray of int
+        What tells the answers apart.
+    page, about : numpy.ndarray of int
+        Places of the answers in `pages`, and of the trial in `abouts`.
+    pages : list of _Page
+        The different answers.
+    abouts : list of _About
+        The different trials, but for who answered them when.
+    """
+
+    key: Ints
     revision: Ints
+    trial: Ints
+    position: Ints
+    participant: Ints
+    instrument: Ints
     page: Ints
+    about: Ints
     pages: list["_Page"]
+    abouts: list["_About"]
+
+
+class _About(NamedTuple):
+    """What a trial is, apart from who answered it."""
+
+    part: str
+    kind: str
+    round: int | None
+    clips: tuple[Shown, ...]
 
 
 class _Page(NamedTuple):
@@ -122,38 +149,48 @@ def _plain(answer: Any) -> Any:
     return tuple(answer) if isinstance(answer, list) else answer
 
 
-def _read_pages(session: Session, study: Study, spec: StudySpec) -> _Given:
-    """Read all answers, each different page once; texts are compared as they are stored."""
-    result = session.execute(
+def _read(session: Session, study: Study) -> _Given:
+    """Read all answers, those with the same text, and trials that show the same, once."""
+    spec, found = studies.spec_of(study), shows(session, study)
+    # Millions of rows pass here, so they come as plain tuples, and few at a time.
+    result = session.connection().execute(
         select(
-            Response.trial_id,
-            Response.revision,
-            Response.instrument,
-            cast(Response.answers, Text),
-            cast(Response.raw, Text),
-            cast(Response.display, Text),
+            *(Response.id, Response.revision, Response.trial_id, Trial.position, Participant.number),
+            *(Response.instrument, *(cast(text, Text) for text in (Response.answers, Response.raw, Response.display))),
+            *(Trial.part, Trial.kind, AnnotationRound.number, Trial.stimulus_id),
         )
+        .select_from(Response)
         .join(Trial, Response.trial_id == Trial.id)
         .join(Participant, Trial.participant_id == Participant.id)
+        .outerjoin(AnnotationRound, Trial.round_id == AnnotationRound.id)
         .where(Participant.study_id == study.id)
-        .order_by(Response.id)
+        .execution_options(yield_per=_BATCH)
     )
     instruments: dict[str, int] = {}
-    known: dict[tuple[str, ...], int] = {}
-    parts: list[Ints] = [np.empty((4, 0), dtype=np.int64)]
+    pages: dict[tuple[str, ...], int] = {}
+    abouts: dict[tuple[Any, ...], int] = {}
+    parts: list[Ints] = [np.empty((8, 0), dtype=np.int64)]
     for batch in result.partitions(_BATCH):
         columns = list(zip(*batch, strict=True))
-        trial, revision, names = columns[:3]
-        page = [known.setdefault(texts, len(known)) for texts in zip(*columns[2:], strict=True)]
-        asked = [instruments.setdefault(one, len(instruments)) for one in names]
-        parts.append(np.array([trial, asked, revision, page], dtype=np.int64))
+        beside = map(found.beside.get, columns[2], repeat(()))
+        codes = (
+            [instruments.setdefault(name, len(instruments)) for name in columns[5]],
+            [pages.setdefault(texts, len(pages)) for texts in zip(*columns[5:9], strict=True)],
+            [abouts.setdefault(about, len(abouts)) for about in zip(*columns[9:], beside, strict=True)],
+        )
+        parts.append(np.array([*columns[:5], *codes], dtype=np.int64))
     named = {name: _instrument(spec, name) for name in instruments}
-    pages = []
-    for name, *texts in known:
-        keyed, raw, display = (json.loads(text or "null") or {} for text in texts)
-        pages.append(_Page(named[name], keyed, raw, display))
-    trials, asked_in, revisions, page_of = np.concatenate(parts, axis=1)
-    return _Given(trials, asked_in, revisions, page_of, pages)
+    # No text, or the text null, stands for answers from before raw and display were kept.
+    read = [(named[name], [json.loads(text or "null") or {} for text in texts]) for name, *texts in pages]
+    key, revision, trial, position, participant, instrument, page, about = np.concatenate(parts, axis=1)
+    return _Given(
+        *(key, revision, trial, position, participant, instrument, page, about),
+        [_Page(asked, *texts) for asked, texts in read],
+        [
+            _About(part, kind, None if number is None else number + 1, found.page(stimulus, others))
+            for part, kind, number, stimulus, others in abouts
+        ],
+    )
 
 
 def _instrument(spec: StudySpec, name: str) -> Instrument:
@@ -161,51 +198,59 @@ def _instrument(spec: StudySpec, name: str) -> Instrument:
     return DISCUSSION if name == DISCUSSION.name and name not in own else spec.instrument(name)
 
 
-def _counting(given: _Given, participant: Ints, position: Ints) -> Ints:
+def _counting(given: _Given) -> Ints:
     """Return where the last revision of each page is, by participant and trial, then as first answered."""
-    order = np.lexsort((given.revision, position, participant))
-    # Pages of one trial are next to each other now; a later revision of one comes later and replaces the earlier.
-    key = given.trial[order] * (int(given.instrument.max(initial=0)) + 1) + given.instrument[order]
-    _, first = np.unique(key, return_index=True)
-    _, last = np.unique(key[::-1], return_index=True)
-    counting: Ints = order[len(key) - 1 - last[np.argsort(first)]]
+    order = np.lexsort((given.key, given.revision, given.position, given.participant))
+    # Answers of one trial are next to each other now; a later revision comes later and replaces the earlier.
+    page = given.trial[order] * (int(given.instrument.max(initial=0)) + 1) + given.instrument[order]
+    _, first = np.unique(page, return_index=True)
+    _, last = np.unique(page[::-1], return_index=True)
+    counting: Ints = order[len(page) - 1 - last[np.argsort(first)]]
     return counting
 
 
-def _table(pages: list[_Page], page: Ints, place: Ints, trials: TrialTable) -> pd.DataFrame:
-    """Return a row for each item of each page; `place` tells the trial of each page."""
-    rows = [list(one.rows()) for one in pages]
+def _table(given: _Given, counting: Ints) -> pd.DataFrame:
+    """Return a row for each item of each page that counts."""
+    rows = [list(one.rows()) for one in given.pages]
     length = np.array([len(one) for one in rows], dtype=np.int64)
+    page = given.page[counting]
     begin, times = np.cumsum(length) - length, length[page]
-    # For each row of the table: which page it belongs to, and which of the different rows it is.
-    owner = np.repeat(place, times)
+    # For each row of the table: the answers that it belongs to, and which of the different rows it is.
+    owner = np.repeat(counting, times)
     row = np.arange(len(owner)) + np.repeat(begin[page] - (np.cumsum(times) - times), times)
     clip, item, word, raw, flipped, where, keyed = _columns(rows)
     number = np.array(clip, dtype=np.int64)[row]
-    shown = trials.shown[trials.pages[owner]]
-    cell = trials.cell(owner, number)
-    names = pd.Categorical([one.instrument.name for one in pages])
+    about = given.about[owner]
+    shown = np.array([len(one.clips) for one in given.abouts], dtype=np.int64)
     return pd.DataFrame(
         {
-            "participant": trials.participant[owner],
-            "part": trials.part[owner],
-            "trial": trials.position[owner],
-            "kind": trials.kind[owner],
-            "round": whole(trials.round[owner], trials.round[owner] > 0),
-            "stimulus": trials.stimuli[cell],
-            "condition": trials.conditions[cell],
-            "clip": whole(number, shown > 0),
-            "instrument": names[np.repeat(page, times)],
+            "participant": given.participant[owner] + 1,
+            "part": pd.Categorical([one.part for one in given.abouts])[about],
+            "trial": given.position[owner],
+            "kind": pd.Categorical([one.kind for one in given.abouts])[about],
+            "round": pd.array([one.round for one in given.abouts], dtype="Int64")[about],
+            "stimulus": _names([[clip.stimulus for clip in one.clips] for one in given.abouts], about, number),
+            "condition": _names([[clip.condition for clip in one.clips] for one in given.abouts], about, number),
+            "clip": pd.arrays.IntegerArray(number, shown[about] == 0),
+            "instrument": pd.Categorical([one.instrument.name for one in given.pages])[given.page[owner]],
             "item": pd.Categorical(item)[row],
             "word": pd.array(word, dtype="Int64")[row],
             "raw": _objects(raw)[row],
             "flipped": np.array(flipped, dtype=bool)[row],
             "place": pd.array(where, dtype="Int64")[row],
             "keyed": _objects(keyed)[row],
-            "shown": shown,
-            "conditions": trials.conditions_of_pages()[trials.pages[owner]],
+            "shown": shown[about],
+            "conditions": _objects([tuple(clip.condition for clip in one.clips) for one in given.abouts])[about],
         }
     )
+
+
+def _names(lists: list[list[str]], which: Ints, place: Ints) -> "pd.Categorical[Any]":
+    """Return the names at places, from 1, of some of the lists; missing where a list is shorter."""
+    widest = max(map(len, lists), default=0)
+    names = pd.Categorical([*(name for one in lists for name in [*one, *[None] * (widest - len(one))]), None])
+    inside = place <= widest
+    return names[np.where(inside, which * widest + place - 1, len(names) - 1)]
 
 
 def _columns(rows: list[list[tuple[Any, ...]]]) -> list[list[Any]]:

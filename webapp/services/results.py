@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property, partial
 
 import pandas as pd
 from sqlalchemy.orm import Session
@@ -9,7 +10,8 @@ from sqlalchemy.orm import Session
 from evaluation.report.analysis import StudyReport, analyse
 from evaluation.study import StudySpec
 from webapp.errors import NotFoundError
-from webapp.services import collected, studies
+from webapp.models import Study
+from webapp.services import collected, report_cache, studies
 from webapp.services.collected import ANSWER_COLUMNS, answers
 from webapp.services.counting import PREFERENCE_COLUMNS, preferences_frame, statistics_frame
 from webapp.services.raters import (
@@ -120,20 +122,32 @@ def reports(session: Session, slug: str) -> dict[str, StudyReport]:
 def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, StudyReport]:
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
-    rows = collected.read(session, study)
-    screened = screenings(session, study, rows, parts)
-    found = {}
-    for name in parts:
-        again = spec.part(name).repeats is not None
+    state = report_cache.state(session, study)
+    evidence, cache = _Evidence(session, study, spec), report_cache.of(session)
+    return {name: cache.get((state, name), partial(evidence.analyse, name)) for name in parts}
+
+
+class _Evidence:
+    """All that a study has collected, read once and only if a report needs it."""
+
+    def __init__(self, session: Session, study: Study, spec: StudySpec) -> None:
+        self._session, self._study, self._spec = session, study, spec
+
+    @cached_property
+    def _rows(self) -> pd.DataFrame:
+        return collected.read(self._session, self._study)
+
+    def analyse(self, part: str) -> StudyReport:
+        spec, rows = self._spec, self._rows
+        again = spec.part(part).repeats is not None
         made = analyse(
-            spec if spec.parts is None else spec.only(name),
-            statistics_frame(spec, rows, name),
-            preferences=preferences_frame(rows, name),
-            repeats=repeats_among(session, study, rows, name) if again else None,
-            screening=screened[name],
+            spec if spec.parts is None else spec.only(part),
+            statistics_frame(spec, rows, part),
+            preferences=preferences_frame(rows, part),
+            repeats=repeats_among(self._session, self._study, rows, part) if again else None,
+            screening=screenings(self._session, self._study, rows, [part])[part],
         )
-        found[name] = replace(made, study=spec)
-    return found
+        return replace(made, study=spec)
 
 
 def _require(spec: StudySpec, part: str) -> None:
