@@ -14,6 +14,7 @@ from evaluation.instruments import Instrument
 from evaluation.instruments.definition import InstrumentDefinition
 from evaluation.study_checks import inconsistencies
 from evaluation.study_parts import (
+    Analysis,
     Cell,
     CellChoice,
     Collect,
@@ -93,6 +94,7 @@ class StudySpec(Piece):
     collect: Collect = Collect()
     share: Sharing = Sharing()
     screening: Screening = Screening()
+    analysis: Analysis = Analysis()
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:

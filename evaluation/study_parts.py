@@ -307,3 +307,20 @@ class Screening(Piece):
     repeats: Threshold | None = Field(
         default=None, description="largest mean difference between a trial and its hidden repeat"
     )
+
+
+class Analysis(Piece):
+    """What the report is to test beside the usual, fixed before the data."""
+
+    equivalence: float | None = Field(
+        default=None,
+        gt=0,
+        le=1e6,
+        description="largest difference of the conditions' mean opinion scores that counts as none (TOST)",
+    )
+    half_width: float = Field(
+        default=0.25,
+        gt=0,
+        le=1e6,
+        description="half-width that the 95 % interval of each clip's mean opinion score should have at most",
+    )

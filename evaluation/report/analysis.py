@@ -106,6 +106,8 @@ class StudyReport:
         How many questionnaires were answered (one instrument about one clip of one trial).
     incomplete : int
         How many of these lack an item, and so have no score.
+    answers : pandas.DataFrame
+        One row for each answered item, checked, as `evaluation.responses.complete`.
     scores : pandas.DataFrame
         One row for each clip of each trial, as `evaluation.responses.score_trials`.
     pad_by_stimulus : pandas.DataFrame
@@ -144,6 +146,7 @@ class StudyReport:
     trials: int
     responses: int
     incomplete: int
+    answers: pd.DataFrame
     scores: pd.DataFrame
     pad_by_stimulus: pd.DataFrame
     pad_by_cell: pd.DataFrame
@@ -234,6 +237,7 @@ def analyse(
         trials=_number_of_trials(table, preferences),
         responses=len(table.drop_duplicates([*KEY, "instrument"])),
         incomplete=_incomplete(spec, table),
+        answers=table,
         scores=scores,
         pad_by_stimulus=pad_by_stimulus,
         pad_by_cell=pad_by_cell,

@@ -25,6 +25,8 @@ class Section(NamedTuple):
         The cells.
     notes : tuple of str
         Sentences under the table.
+    source : str
+        Name of the frame that has the numbers with full digits, if it is not the section's.
     """
 
     name: str
@@ -33,6 +35,12 @@ class Section(NamedTuple):
     text_columns: int
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    source: str = ""
+
+    @property
+    def frame(self) -> str:
+        """Name of the frame that has the numbers with full digits."""
+        return self.source or self.name
 
 
 def label(texts: object) -> str:
