@@ -37,13 +37,19 @@ format: setup ## put the code into the house's form
 	@$(BIN)/ruff check --fix .
 	@$(BIN)/ruff format .
 
-bench: setup ## measure (padlab bench render)
+bench: setup $(STAMPS)/peers ## measure rendering, training, the study engine, and the statistics beside other packages
 	@$(BIN)/padlab bench render
+	@$(BIN)/padlab bench train
+	@$(BIN)/padlab bench study
+	@$(BIN)/padlab bench statistics
 
-lock: setup ## write requirements/lock.txt anew from pyproject.toml
+lock: setup ## write requirements/lock.txt and bench.txt anew from pyproject.toml
 	@$(BIN)/python -m pip install -qq uv
 	@$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
 	  --no-emit-index-url --no-emit-find-links --group dev pyproject.toml -o requirements/lock.txt >/dev/null
+	@$(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-header --no-annotate \
+	  --no-emit-index-url --no-emit-find-links --extra bench -c requirements/lock.txt pyproject.toml \
+	  -o requirements/bench.txt >/dev/null
 
 clean: ## remove the environment and caches; studies and ratings (instance/) stay
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
@@ -61,6 +67,12 @@ $(STAMPS)/python: requirements/lock.txt pyproject.toml $(STAMPS)/system
 
 $(STAMPS)/translations: $(CATALOGUES) $(STAMPS)/python
 	@$(BIN)/pybabel -q compile -d webapp/translations
+	@touch $@
+
+# What benchmarks compare with; padlab itself needs none of it.
+$(STAMPS)/peers: requirements/bench.txt $(STAMPS)/python
+	@echo "Installing the packages that are compared with"
+	@$(BIN)/python -m pip install -qq --require-hashes --no-deps -r requirements/bench.txt
 	@touch $@
 
 # The command checks what is there and returns at once when it is sound; the stamp follows the code that compiles it.

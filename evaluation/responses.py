@@ -161,8 +161,9 @@ def score_trials(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
     trials = table.drop_duplicates(_KEY)[[*_KEY, "stimulus", "condition"]].reset_index(drop=True)
     nothing = (math.nan, math.nan, math.nan)
     pads = {cell: input_pad(spec, *cell) or nothing for cell in spec.cells()}
-    given = [pads[Cell(*cell)] for cell in zip(trials["stimulus"], trials["condition"], strict=True)]
-    trials[list(INPUT_COLUMNS)] = np.array(given, dtype=float).reshape(-1, len(DIMENSIONS))
+    which, shown = pd.factorize(pd.MultiIndex.from_frame(trials[["stimulus", "condition"]]))
+    given = np.array([pads[Cell(*cell)] for cell in shown], dtype=float).reshape(-1, len(DIMENSIONS))
+    trials[list(INPUT_COLUMNS)] = given[which]
     for instrument in asked_about_clips(spec):
         numbers = _numbers(instrument, table[table["instrument"] == instrument.name])
         numbers = numbers.reindex(pd.MultiIndex.from_frame(trials[_KEY]))

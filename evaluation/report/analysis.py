@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TypeVar
 
+import numpy as np
 import pandas as pd
 
 from evaluation.errors import InsufficientDataError
@@ -129,6 +130,8 @@ class StudyReport:
         How raters chose in each single choice about one clip.
     preferences : BradleyTerry, Unavailable or None
         Scores of the conditions from comparisons of two clips; None if there are none in the study.
+    repeated : pandas.DataFrame or None
+        One row for each score of each trial that was repeated, as `analyse` takes it.
     repeats : tuple of RepeatedScore
         How well raters agree with themselves in hidden repeats; empty if there are none.
     screening : ScreeningReport or None
@@ -158,6 +161,7 @@ class StudyReport:
     scores_by_cell: pd.DataFrame
     votes: tuple[VotesOfCell, ...]
     preferences: BradleyTerry | Unavailable | None
+    repeated: pd.DataFrame | None
     repeats: tuple[RepeatedScore, ...]
     screening: ScreeningReport | None
     used: "StudyReport | None"
@@ -249,6 +253,7 @@ def analyse(
         scores_by_cell=_in_study_order(opinions_by(scores, numbers, ["stimulus", "condition"]), spec, first=numbers),
         votes=votes_by_cell(spec, table, shown),
         preferences=preference_scores(preferences, conditions) if _compares(spec) else None,
+        repeated=repeats,
         repeats=repeated_scores(repeats),
         screening=screened,
         used=_with_used(spec, table, preferences, repeats, screened),
@@ -263,8 +268,9 @@ def _rated_cells(spec: StudySpec) -> tuple[Cell, ...]:
 
 
 def _number_of_trials(table: pd.DataFrame, preferences: pd.DataFrame | None) -> int:
-    frames = [table] if preferences is None else [table, preferences]
-    return len({key for one in frames for key in zip(one["participant"], one["trial"], strict=True)})
+    page = ["participant", "trial"]
+    frames = [table[page]] if preferences is None else [table[page], preferences[page]]
+    return len(pd.concat(frames).drop_duplicates())
 
 
 def _compares(spec: StudySpec) -> bool:
@@ -370,10 +376,8 @@ def _incomplete(spec: StudySpec, table: pd.DataFrame) -> int:
         for item in statistical(one)
         if item.required
     }
-    expected = pd.Series(
-        [needed.get(key) for key in zip(table["instrument"], table["item"], strict=True)],
-        index=table.index,
-        dtype=float,
-    )
+    which, asked = pd.factorize(pd.MultiIndex.from_frame(table[["instrument", "item"]]))
+    numbers = np.array([needed.get(key, np.nan) for key in asked], dtype=float)
+    expected = pd.Series(numbers[which] if len(table) else numbers, index=table.index, dtype=float)
     answered = expected.dropna().groupby([table[column] for column in (*KEY, "instrument")]).agg(["size", "first"])
     return int((answered["size"] < answered["first"]).sum())

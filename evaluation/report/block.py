@@ -63,7 +63,9 @@ def results_section(
         (analysis, unit, found.reason if isinstance(found, Unavailable) else found.apa())
         for analysis, unit, found in results
     )
-    flags = [flag for _, _, found in results if isinstance(found, Result) for flag in found.flags]
+    flags = [
+        f"{analysis}: {flag}" for analysis, _, found in results if isinstance(found, Result) for flag in found.flags
+    ]
     return Section(name, title, ("Analysis", "Unit", "Result"), 3, rows, tuple(dict.fromkeys([*notes, *flags])))
 
 

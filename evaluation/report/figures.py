@@ -1,4 +1,4 @@
-"""The figures of a report, as SVG."""
+"""The figures of a report, as SVG and PNG."""
 
 import textwrap
 from collections.abc import Callable
@@ -12,10 +12,22 @@ from matplotlib.ticker import MaxNLocator
 from evaluation.errors import EvaluationError
 from evaluation.instruments.mos import MOS5
 from evaluation.report.analysis import ReverseEvaluation, StudyReport, Unavailable
-from evaluation.report.drawing import COLOURS, GRID, INK, NAMES_OF_DIMENSIONS, SHAPES, SOFT, as_svg, drawable, prepare
+from evaluation.report.drawing import (
+    COLOURS,
+    GRID,
+    INK,
+    NAMES_OF_DIMENSIONS,
+    SHAPES,
+    SOFT,
+    as_png,
+    as_svg,
+    drawable,
+    prepare,
+)
+from evaluation.report.further_figures import has_ellipses, has_spread, pad_ellipsoids, spread_and_mean
 from evaluation.report.labels import place_labels
 from evaluation.report.tables import label
-from evaluation.responses import DIMENSIONS
+from evaluation.responses import DIMENSIONS, pad_instruments
 from evaluation.statistics import wording
 from evaluation.statistics.opinion import OpinionScore
 
@@ -47,6 +59,18 @@ def draw(name: str, report: StudyReport) -> str:
     if name not in _FIGURES:
         raise EvaluationError(f"There is no figure {name!r}; there are {', '.join(_FIGURES)}.")
     return as_svg(lambda: _FIGURES[name](report), name=name)
+
+
+def draw_png(name: str, report: StudyReport) -> bytes:
+    """Return a figure as the bytes of a PNG file, the same for the same report; parameters and errors as `draw`."""
+    if name not in _FIGURES:
+        raise EvaluationError(f"There is no figure {name!r}; there are {', '.join(_FIGURES)}.")
+    return as_png(lambda: _FIGURES[name](report))
+
+
+def shown(report: StudyReport) -> tuple[str, ...]:
+    """Return the names of the figures that a study has something for."""
+    return tuple(name for name in _FIGURES if _SHOWN[name](report))
 
 
 def caption(name: str) -> str:
@@ -147,7 +171,20 @@ def mos_by_condition(report: StudyReport) -> Figure:
 
 
 _FIGURES: MappingProxyType[str, Callable[[StudyReport], Figure]] = MappingProxyType(
-    {"reverse_evaluation": reverse_evaluation, "mos_by_condition": mos_by_condition}
+    {
+        "reverse_evaluation": reverse_evaluation,
+        "mos_by_condition": mos_by_condition,
+        "pad_ellipsoids": pad_ellipsoids,
+        "precision": spread_and_mean,
+    }
+)
+_SHOWN: MappingProxyType[str, Callable[[StudyReport], bool]] = MappingProxyType(
+    {
+        "reverse_evaluation": lambda report: bool(pad_instruments(report.spec)),
+        "mos_by_condition": lambda report: "mos5" in report.spec.instrument_names,
+        "pad_ellipsoids": has_ellipses,
+        "precision": has_spread,
+    }
 )
 _CAPTIONS = MappingProxyType(
     {
@@ -158,6 +195,14 @@ _CAPTIONS = MappingProxyType(
         "mos_by_condition": (
             "Mean opinion score of each condition over all ratings, with its 95 % interval; the small points on its "
             "left are the stimuli."
+        ),
+        "pad_ellipsoids": (
+            "Ratings of each stimulus in the space of pleasure, arousal and dominance, with the ellipse that holds "
+            "half of a normal distribution of their mean and covariance in each plane."
+        ),
+        "precision": (
+            "Variance of the ratings of each clip against their mean. Solid: the SOS hypothesis with the parameter a; "
+            "dashed: the largest variance that the scale allows."
         ),
     }
 )

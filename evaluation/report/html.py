@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evaluation.report import figures, tables
@@ -26,7 +26,8 @@ def render(report: StudyReport) -> str:
     drawn = [section.name for section in sections if section.name in figures.NAMES]
     # Markup, since matplotlib has escaped the texts in its drawing.
     drawings = {name: Markup(figures.draw(name, report)) for name in drawn}  # noqa: S704
-    return _template().render(
+    return page(
+        "report.html",
         title=tables.title(report),
         report=report,
         sections=sections,
@@ -36,9 +37,27 @@ def render(report: StudyReport) -> str:
     )
 
 
+def page(template: str, **content: object) -> str:
+    """Return a page of the house's look as the text of an HTML file that needs nothing else.
+
+    Parameters
+    ----------
+    template : str
+        File in the package's folder of templates that extends ``page.html``.
+    **content
+        What it shows; ``title`` and ``headline``, a sequence of sentences, are always needed.
+
+    Returns
+    -------
+    str
+        HTML; every text is escaped.
+    """
+    return _templates().get_template(template).render(content)
+
+
 @cache
-def _template() -> Template:
-    environment = Environment(
+def _templates() -> Environment:
+    return Environment(
         loader=PackageLoader("evaluation.report"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -46,4 +65,3 @@ def _template() -> Template:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template("report.html")

@@ -128,6 +128,12 @@ def _frames(report: StudyReport) -> dict[str, pd.DataFrame]:
     ]
     anova = report.mos_anova.to_frame() if isinstance(report.mos_anova, OneWayAnova) else pd.DataFrame()
     return {
+        "overview": pd.DataFrame(
+            {
+                "name": ["participants", "trials", "questionnaires", "incomplete"],
+                "number": [report.participants, report.trials, report.responses, report.incomplete],
+            }
+        ),
         "reverse_evaluation": _stacked(reverse, ["condition", "dimension"]),
         "pad_by_stimulus": report.pad_by_stimulus,
         "pad_by_cell": report.pad_by_cell,
@@ -264,7 +270,9 @@ def _mos_by_stimulus(report: StudyReport) -> Section:
             rows.append((label(stimulus.label), *written))
     header = ("Stimulus", *(label(report.spec.condition(name).label) for name in names))
     notes = ("In brackets the number of ratings.",) if rows else ("No clip has been rated with mos5 yet.",)
-    return Section("mos_by_stimulus", "Mean opinion score of each stimulus", header, 1, tuple(rows), notes)
+    return Section(
+        "mos_by_stimulus", "Mean opinion score of each stimulus", header, 1, tuple(rows), notes, "mos_by_cell"
+    )
 
 
 def _signed(value: float) -> str:

@@ -29,8 +29,6 @@ BT500_RATERS = 6
 BT500_ASYMMETRY = 0.3
 """Raters whose outlying scores lie mostly on one side, by this or more, are not rejected (ITU-R BT.500)."""
 
-# A rater with more than this share of all weight is the solution alone.
-_COLLAPSED = 0.99
 _ROUNDING = 1e-9
 _FEW = "fewer than 3 raters who share at least 3 clips"
 
@@ -230,7 +228,7 @@ class Measures:
                 if model is None or sizes is None or model.group[place] < 0 or sizes[model.group[place] + 1] < LEAST:
                     yield score, rater, None, None, False
                 else:
-                    collapsed = model.largest_weight > _COLLAPSED
+                    collapsed = model.collapsed
                     yield score, rater, float(model.bias[place]), float(model.inconsistency[place]), collapsed
 
     def _checks(self, kind: str, what: str) -> Iterator[Measure]:

@@ -7,16 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy import special
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
-from evaluation.statistics.matrices import centred_columns, constant_columns, finite_array
+from evaluation.statistics.correlation import pearson_p_values, without_rounding
+from evaluation.statistics.matrices import finite_array
+from evaluation.statistics.pairwise import standardised
+from evaluation.statistics.raters import listed
+from evaluation.statistics.result import Result
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class DimensionAgreement:
+class DimensionAgreement(Result):
     """How well raters agree on one dimension.
 
     Attributes
@@ -48,23 +51,31 @@ class DimensionAgreement:
     correlations: FloatArray
     p_values: FloatArray
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return a sentence, for instance ``P: SD = 0.20, mean pairwise r = .80 (each pair p < .001)``."""
         text = f"{self.dimension}: SD = {wording.number(self.sd)}"
         if self.pairwise_r is None or self.largest_p is None:
-            text = f"{text}, no pairwise r since fewer than two raters vary"
-        else:
-            p = wording.p_value(self.largest_p)
-            which = "each pair" if self.largest_p < 0.001 else "largest"
-            text = f"{text}, mean pairwise r = {wording.share(self.pairwise_r)} ({which} {p})"
-        if self.constant_raters:
-            names = ", ".join(str(rater) for rater in self.constant_raters)
-            text = f"{text}; raters who gave one rating throughout, left out of r: {names}"
-        return text
+            return f"{text}, no pairwise r"
+        which = "each pair" if self.largest_p < 0.001 else "largest"
+        p = wording.p_value(self.largest_p)
+        return f"{text}, mean pairwise r = {wording.share(self.pairwise_r)} ({which} {p})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the result as a frame of one row; NaN where there is no correlation."""
+        return pd.DataFrame(
+            {
+                "dimension": [self.dimension],
+                "items": [self.items],
+                "raters": [self.raters],
+                "sd": [self.sd],
+                "pairwise_r": [_or_nan(self.pairwise_r)],
+                "largest_p": [_or_nan(self.largest_p)],
+            }
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnnotationAgreement:
+class AnnotationAgreement(Result):
     """Agreement of raters on each dimension, in the order of the dimensions."""
 
     dimensions: tuple[DimensionAgreement, ...]
@@ -76,22 +87,17 @@ class AnnotationAgreement:
         names = ", ".join(found.dimension for found in self.dimensions)
         raise DataError(f"There is no dimension {dimension!r}; there are {names}.")
 
+    def apa(self) -> str:
+        """Return the sentences of all dimensions, with semicolons between."""
+        return "; ".join(found.apa() for found in self.dimensions)
+
     def summary(self) -> str:
-        """Return a sentence for each dimension, one on a line."""
+        """Return the sentence of each dimension, one on a line, each before its flags."""
         return "\n".join(found.summary() for found in self.dimensions)
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each dimension; NaN where there is no correlation."""
-        return pd.DataFrame(
-            {
-                "dimension": [found.dimension for found in self.dimensions],
-                "items": [found.items for found in self.dimensions],
-                "raters": [found.raters for found in self.dimensions],
-                "sd": [found.sd for found in self.dimensions],
-                "pairwise_r": [_or_nan(found.pairwise_r) for found in self.dimensions],
-                "largest_p": [_or_nan(found.largest_p) for found in self.dimensions],
-            }
-        )
+        return pd.concat([found.to_frame() for found in self.dimensions], ignore_index=True)
 
 
 def annotation_agreement(ratings: npt.ArrayLike, *, dimensions: Sequence[str] = ("P", "A", "D")) -> AnnotationAgreement:
@@ -134,12 +140,10 @@ def annotation_agreement(ratings: npt.ArrayLike, *, dimensions: Sequence[str] = 
             f"Agreement needs at least 3 items and 2 raters; there are {items} items and {raters} raters."
         )
     spreads = deviation(stack).mean(axis=0)
-    return AnnotationAgreement(
-        dimensions=tuple(
-            _agree(stack[:, :, place], dimension=name, sd=float(spreads[place]))
-            for place, name in enumerate(dimensions)
-        )
+    found = tuple(
+        _agree(stack[:, :, place], dimension=name, sd=float(spreads[place])) for place, name in enumerate(dimensions)
     )
+    return AnnotationAgreement(dimensions=found, flags=tuple(flag for one in found for flag in one.flags))
 
 
 def deviation(ratings: npt.ArrayLike) -> FloatArray:
@@ -176,22 +180,17 @@ def deviation(ratings: npt.ArrayLike) -> FloatArray:
 
 def _agree(ratings: FloatArray, *, dimension: str, sd: float) -> DimensionAgreement:
     items, raters = ratings.shape
-    _, differences = centred_columns(ratings)
-    constant = constant_columns(ratings, differences)
-    varying = np.flatnonzero(~constant)
-    # Scaled by the largest first, so that squares of small numbers do not vanish.
-    scaled = differences[:, varying] / np.abs(differences[:, varying]).max(axis=0)
-    scaled /= np.sqrt((scaled**2).sum(axis=0))
-    between = np.clip(scaled.T @ scaled, -1, 1)
+    columns, varies = standardised(ratings)
+    varying = np.flatnonzero(varies)
+    between = without_rounding(columns.T @ columns)
     np.fill_diagonal(between, 1)
     correlations, p_values = np.full((2, raters, raters), math.nan)
     correlations[np.ix_(varying, varying)] = between
-    # The beta form of the t test, which stays exact for correlations near 1.
-    half = items / 2 - 1
-    p_values[np.ix_(varying, varying)] = 2 * special.betainc(half, half, (1 - np.abs(between)) / 2)
+    p_values[np.ix_(varying, varying)] = pearson_p_values(between, items)
     np.fill_diagonal(p_values, math.nan)
     pairs = np.triu_indices(raters, 1)
     known = ~np.isnan(correlations[pairs])
+    constant = tuple(int(rater) + 1 for rater in np.flatnonzero(~varies))
     any_pair = bool(known.any())
     return DimensionAgreement(
         dimension=dimension,
@@ -200,10 +199,21 @@ def _agree(ratings: FloatArray, *, dimension: str, sd: float) -> DimensionAgreem
         sd=sd,
         pairwise_r=float(correlations[pairs][known].mean()) if any_pair else None,
         largest_p=float(p_values[pairs][known].max()) if any_pair else None,
-        constant_raters=tuple(int(rater) + 1 for rater in np.flatnonzero(constant)),
+        constant_raters=constant,
         correlations=correlations,
         p_values=p_values,
+        flags=_flags(dimension, constant, any_pair=any_pair),
     )
+
+
+def _flags(dimension: str, constant: tuple[int, ...], *, any_pair: bool) -> tuple[str, ...]:
+    flags = []
+    if constant:
+        names = listed([str(rater) for rater in constant])
+        flags.append(f"{dimension}: raters who gave one rating throughout, left out of r: {names}.")
+    if not any_pair:
+        flags.append(f"{dimension}: no pairwise r since fewer than two raters vary.")
+    return tuple(flags)
 
 
 def _or_nan(value: float | None) -> float:

@@ -11,57 +11,106 @@ BoolArray = npt.NDArray[np.bool_]
 LEAST_VARIANCE = 1e-8
 """Added to variances, so that the weight of a rater without any residual is finite; as in the authors' own program."""
 
+# Below this share of the sum of squares that it is left of, a remainder has lost digits and is computed anew.
+_CANCELLED = 1e-3
+# Rows that a processor's cache holds while they are worked on.
+_BLOCK = 64
+
 
 class AlternatingProjection:
     """The search for qualities, biases and inconsistencies of `evaluation.statistics.rater_model`.
 
-    It works on what the plain means leave of the ratings, so that sums of squares stay exact.
+    Each step reads the ratings twice; sums of squares are not formed again but follow from the products. Where that
+    would lose digits the search works on what the plain means leave of the ratings.
 
     Parameters
     ----------
     scores : numpy.ndarray, shape (items, raters)
         Ratings, 0 where there is none.
-    given : numpy.ndarray of bool, shape (items, raters)
-        Which are there; at least one in each row and column.
+    given : numpy.ndarray of bool, shape (items, raters), or None
+        Which are there, at least one in each row and column; None if all are.
 
     Attributes
     ----------
-    quality, bias : numpy.ndarray, shapes (items,) and (raters,)
+    quality, bias, inconsistency : numpy.ndarray, shapes (items,), (raters,) and (raters,)
         The solution, once it was `run`.
+    per_rater : numpy.ndarray, shape (raters,) or ()
+        Ratings of each rater; one number if nothing is missing.
     """
 
-    def __init__(self, scores: FloatArray, given: BoolArray) -> None:
-        self.complete = bool(given.all())
-        self.mask = given.astype(float)
-        self.per_item, self.per_rater = self.mask.sum(axis=1), self.mask.sum(axis=0)
-        self.quality = scores.sum(axis=1) / self.per_item
-        self.rest = (scores - self.quality[:, None]) * self.mask
-        self.bias = self.rest.sum(axis=0) / self.per_rater
-        self.rest = (self.rest - self.bias) * self.mask
-        # The steps below change qualities and biases by `quality` and `bias` of the rest.
-        self.squares = np.einsum("ji,ji->i", self.rest, self.rest)
-        self.sums = self.rest.sum(axis=0)
+    def __init__(self, scores: FloatArray, given: BoolArray | None) -> None:
+        items, raters = scores.shape
+        self.mask = None if given is None else given.astype(float)
+        self.per_item, self.per_rater = self._over_raters(np.ones(raters)), self._over_items(np.ones(items))
+        # Products with ones are the quickest sums, and whatever they round away is left in the rest.
+        means = scores @ np.ones(raters) / self.per_item
+        biases = (np.ones(items) @ scores - self._over_items(means)) / self.per_rater
+        # The steps below change qualities and biases by `quality` and `bias` of the rest, beginning here.
+        self.quality, self.bias, self.rest = np.zeros(items), np.zeros(raters), scores
+        self.start = means, biases
+        self.squares = np.einsum("ji,ji->i", scores, scores)
+        self.sums = np.ones(items) @ scores
+        self.inconsistency = np.zeros(raters)
+        if self.mask is not None or self._cancelled(means, biases).any():
+            self._take_away(means, biases)
+
+    def _cancelled(self, quality: FloatArray, bias: FloatArray) -> BoolArray:
+        """Return for which raters the difference of large sums would lose digits."""
+        left = self._left(quality, bias, self._over_items(quality))
+        result: BoolArray = left < _CANCELLED * self.squares
+        return result
+
+    def _take_away(self, quality: FloatArray, bias: FloatArray) -> None:
+        """Go on with what these leave of the ratings, where sums of the ratings themselves would lose digits."""
+        scores, self.rest = self.rest, np.empty_like(self.rest)
+        self.quality, self.bias = quality, bias
+        self.start = np.zeros(quality.size), np.zeros(bias.size)
+        self.squares = np.zeros(bias.size)
+        for start in range(0, quality.size, _BLOCK):
+            rows = slice(start, start + _BLOCK)
+            block = np.subtract(scores[rows], quality[rows, None], out=self.rest[rows])
+            block -= bias
+            if self.mask is not None:
+                block *= self.mask[rows]
+            self.squares += np.einsum("ji,ji->i", block, block)
+        self.sums = np.ones(quality.size) @ self.rest
 
     def run(self, tolerance: float, steps: int) -> tuple[int, bool]:
         """Take steps until the qualities change by less than the tolerance; return how many, and whether they do."""
         quality, bias = self._equal_weights(tolerance, steps)
-        sums, squares = self._over_items(quality), self._over_items(quality**2)
+        left = self._left(quality, bias, self._over_items(quality))
         converged, step = False, 0
         while step < steps and not converged:
             step += 1
-            # The sum of (rest - quality - bias) squared over the items of each rater.
-            left = self.squares - 2 * (quality @ self.rest) - 2 * bias * self.sums
-            left += squares + 2 * bias * sums + self.per_rater * bias**2
-            weights = 1 / (np.maximum(left, 0) / self.per_rater + LEAST_VARIANCE)
+            weights = 1 / (left / self.per_rater + LEAST_VARIANCE)
             weighted = self.rest @ weights - self._over_raters(weights * bias)
             before, quality = quality, weighted / self._over_raters(weights)
-            sums, squares = self._over_items(quality), self._over_items(quality**2)
+            sums = self._over_items(quality)
             bias = (self.sums - sums) / self.per_rater
+            left = self._left(quality, bias, sums)
             converged = float(np.linalg.norm(quality - before)) < tolerance
-        self.quality += quality
-        self.bias += bias
-        self.rest = (self.rest - quality[:, None] - bias) * self.mask
+        self.quality = self.quality + quality
+        self.bias = self.bias + bias
+        self.inconsistency = np.sqrt(self._exactly(left, quality, bias) / self.per_rater)
         return step, converged
+
+    def _left(self, quality: FloatArray, bias: FloatArray, sums: FloatArray) -> FloatArray:
+        """Return the sum of (rest - quality - bias) squared over each rater's items, whose qualities have the sums."""
+        left = self.squares - 2 * (quality @ self.rest) - 2 * bias * self.sums
+        left += self._over_items(quality**2) + 2 * bias * sums + self.per_rater * bias**2
+        result: FloatArray = np.maximum(left, 0)
+        return result
+
+    def _exactly(self, left: FloatArray, quality: FloatArray, bias: FloatArray) -> FloatArray:
+        """Return what is left, summed over the residuals where the difference of large sums lost digits."""
+        left = left.copy()
+        small = np.flatnonzero(left < _CANCELLED * self.squares)
+        if small.size:
+            residuals = self.rest[:, small] - quality[:, None] - bias[small]
+            if self.mask is not None:
+                residuals *= self.mask[:, small]
+            left[small] = np.einsum("ji,ji->i", residuals, residuals)
+        return left
 
     def _equal_weights(self, tolerance: float, steps: int) -> tuple[FloatArray, FloatArray]:
         """Return where to begin: the solution for raters who are equally consistent.
@@ -69,21 +118,16 @@ class AlternatingProjection:
         Where nothing is missing these are the plain means. Where something is, plain means would depend on who happened
         to rate what, and a rater's constant could lead to another solution.
         """
-        quality, bias = np.zeros(len(self.rest)), np.zeros(self.rest.shape[1])
-        per_item = self.rest.sum(axis=1)
-        for _ in range(0 if self.complete else steps):
+        quality, bias = self.start
+        if self.mask is None:
+            return quality, bias
+        per_item = self.rest @ np.ones(bias.size)
+        for _ in range(steps):
             before, quality = quality, (per_item - self._over_raters(bias)) / self.per_item
             bias = (self.sums - self._over_items(quality)) / self.per_rater
             if float(np.linalg.norm(quality - before)) < tolerance:
                 break
         return quality, bias
-
-    def inconsistency(self) -> FloatArray:
-        """Return the standard deviation of what is left, from the residuals themselves."""
-        means = self.rest.sum(axis=0) / self.per_rater
-        squares = np.einsum("ji,ji->i", self.rest, self.rest) / self.per_rater
-        result: FloatArray = np.sqrt(np.maximum(squares - means**2, 0))
-        return result
 
     def centre(self, group: IntArray, group_of_items: IntArray) -> None:
         """Give the biases of each group the mean 0."""
@@ -92,11 +136,9 @@ class AlternatingProjection:
         self.quality += means[group_of_items]
 
     def _over_raters(self, values: FloatArray) -> FloatArray:
-        """Return the sum of the values over the raters of each item."""
-        result: FloatArray = np.full(len(self.mask), values.sum()) if self.complete else self.mask @ values
-        return result
+        """Return the sum of the values over the raters of each item; one for all items if nothing is missing."""
+        return np.asarray(values.sum()) if self.mask is None else self.mask @ values
 
     def _over_items(self, values: FloatArray) -> FloatArray:
-        """Return the sum of the values over the items of each rater."""
-        result: FloatArray = np.full(self.per_rater.size, values.sum()) if self.complete else values @ self.mask
-        return result
+        """Return the sum of the values over the items of each rater; one for all raters if nothing is missing."""
+        return np.asarray(values.sum()) if self.mask is None else values @ self.mask

@@ -1,21 +1,22 @@
 """One-way analysis of variance."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy import stats
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import FloatArray, centred, finite_vector
+from evaluation.statistics.arrays import finite_vector
+from evaluation.statistics.groups import Moments, check_sizes, group_vectors, matrix_moments, moments, variance_ratio
+from evaluation.statistics.result import Result
 
 
-@dataclass(frozen=True, kw_only=True)
-class Group:
+class Group(NamedTuple):
     """One group of an analysis of variance; `sd` is None for a group of one value."""
 
     name: str
@@ -25,7 +26,7 @@ class Group:
 
 
 @dataclass(frozen=True, kw_only=True)
-class OneWayAnova:
+class OneWayAnova(Result):
     """A one-way analysis of variance.
 
     Attributes
@@ -55,7 +56,7 @@ class OneWayAnova:
     omega_squared: float
     groups: tuple[Group, ...]
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return the result as a sentence in APA style, for instance ``F(2, 57) = 38.70, p < .001, η² = .58``."""
         ratio = f"F({self.df_between}, {self.df_within}) = {wording.number(self.F)}"
         sizes = f"η² = {wording.share(self.eta_squared)}, ω² = {wording.share(self.omega_squared)}"
@@ -109,22 +110,37 @@ def one_way(groups: Mapping[str, npt.ArrayLike]) -> OneWayAnova:
     Fisher (1925), Statistical Methods for Research Workers, chapter 7; omega squared by Hays (1963), Statistics for
     Psychologists.
     """
-    vectors = {str(name): finite_vector(values, name=f"group {name}") for name, values in groups.items()}
-    for name, vector in vectors.items():
-        if vector.size == 0:
-            raise InsufficientDataError(f"The group {name} has no values, so the groups cannot be compared.")
-    _check_sizes([vector.size for vector in vectors.values()])
-    origin = float(next(iter(vectors.values()))[0])
-    offsets, inner, members = [], [], []
-    for name, vector in vectors.items():
-        offset, differences = centred(vector - origin)
-        squares = float(differences @ differences)
-        offsets.append(offset)
-        inner.append(squares)
-        sd = math.sqrt(squares / (vector.size - 1)) if vector.size > 1 else None
-        members.append(Group(name=name, n=vector.size, mean=origin + offset, sd=sd))
-    largest = max(float(np.abs(vector).max()) for vector in vectors.values())
-    return _analyse(tuple(members), np.array(offsets), SSW=math.fsum(inner), largest=largest)
+    return _analyse(moments(group_vectors(groups)))
+
+
+def one_way_of_matrix(matrix: npt.ArrayLike, names: Sequence[str] | None = None) -> OneWayAnova:
+    """Compare the means of the columns of a matrix: `one_way` for groups of one size, and much quicker for many.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (n, k)
+        Finite numbers; each of the k columns is a group of n values. Groups with missing values differ in size and
+        are for `one_way`.
+    names : sequence of str, optional
+        Names of the groups; 1, 2, 3, … if not given.
+
+    Returns
+    -------
+    OneWayAnova
+        As `one_way`.
+
+    Raises
+    ------
+    DataError
+        If it is no matrix of finite numbers, or there is not one name, and another one, for each column.
+    InsufficientDataError
+        As `one_way`.
+
+    References
+    ----------
+    As `one_way`.
+    """
+    return _analyse(matrix_moments(matrix, names))
 
 
 def one_way_from_summary(
@@ -156,24 +172,26 @@ def one_way_from_summary(
     ----------
     Larson (1992), Analysis of variance with just summary statistics as input, The American Statistician 46:151.
     """
-    sizes = dict.fromkeys(means, ns) if isinstance(ns, int) else dict(ns)
+    sizes = dict(ns) if isinstance(ns, Mapping) else dict.fromkeys(means, ns)
     if not set(means) == set(sds) == set(sizes):
         raise DataError("Means, standard deviations and sizes must be given for the same groups.")
     centres = finite_vector([means[name] for name in means], name="means")
     spreads = finite_vector([sds[name] for name in means], name="standard deviations")
-    counts = [sizes[name] for name in means]
+    counts = finite_vector([sizes[name] for name in means], name="sizes")
     if (spreads < 0).any():
         raise DataError("A standard deviation is negative, but must be 0 or more.")
-    if any(count < 1 for count in counts):
+    if (counts < 1).any() or (counts % 1).any():
         raise DataError("A group's size is not positive, but must be a whole number of 1 or more.")
-    _check_sizes(counts)
-    members = tuple(
-        Group(name=name, n=count, mean=float(mean), sd=float(sd) if count > 1 else None)
-        for name, count, mean, sd in zip(means, counts, centres, spreads, strict=True)
+    check_sizes(counts.astype(np.int64))
+    found = Moments(
+        names=tuple(map(str, means)),
+        sizes=counts.astype(np.int64),
+        origin=float(centres[0]),
+        offsets=centres - centres[0],
+        squares=(counts - 1) * spreads**2,
+        largest=float(np.abs(centres).max()),
     )
-    inner = [(group.n - 1) * group.sd**2 for group in members if group.sd is not None]
-    largest = float(np.abs(centres).max())
-    return _analyse(members, centres - centres[0], SSW=math.fsum(inner), largest=largest)
+    return _analyse(found)
 
 
 def pooled_sd_from_f(means: npt.ArrayLike, n: int, F: float) -> float:
@@ -215,36 +233,29 @@ def pooled_sd_from_f(means: npt.ArrayLike, n: int, F: float) -> float:
     return math.sqrt(n * float(np.var(centres, ddof=1)) / F)
 
 
-def _check_sizes(counts: list[int]) -> None:
-    if len(counts) < 2:
-        raise InsufficientDataError(
-            f"At least two groups are needed to compare means; there is {len(counts) or 'none'}."
-        )
-    if sum(counts) <= len(counts):
-        raise InsufficientDataError("Each group has only one value; at least one group needs two or more.")
+def described(found: Moments) -> tuple[Group, ...]:
+    """Return size, mean and standard deviation of each group."""
+    single = found.sizes == 1
+    sds = np.sqrt(found.squares / np.where(single, 1, found.sizes - 1))
+    means = (found.origin + found.offsets).tolist()
+    groups = map(Group, found.names, found.sizes.tolist(), means, sds.tolist())
+    if not single.any():
+        return tuple(groups)
+    return tuple(group if group.n > 1 else group._replace(sd=None) for group in groups)
 
 
-def _analyse(groups: tuple[Group, ...], offsets: FloatArray, *, SSW: float, largest: float) -> OneWayAnova:
-    sizes = np.array([group.n for group in groups])
-    df_between, df_within = len(groups) - 1, int(sizes.sum()) - len(groups)
-    grand = float(sizes @ offsets) / float(sizes.sum())
-    SSB = math.fsum(sizes * (offsets - grand) ** 2)
-    # Squares of differences that are no more than the rounding of the values mean that nothing varies.
-    negligible = float(sizes.sum()) * (4 * np.finfo(float).eps * largest) ** 2
-    SSB, SSW = (0.0 if squares <= negligible else squares for squares in (SSB, SSW))
-    total = SSB + SSW
-    if total == 0:
-        raise InsufficientDataError("All values are the same, so there is no variance to analyse.")
-    within = SSW / df_within
-    F = (SSB / df_between) / within if within > 0 else math.inf
+def _analyse(found: Moments) -> OneWayAnova:
+    ratio = variance_ratio(found)
+    within = ratio.SSW / ratio.df_within
+    total = ratio.SSB + ratio.SSW
+    flags = [] if within > 0 else ["No group varies within itself, so F is infinite."]
+    single = int((found.sizes == 1).sum())
+    if single:
+        flags.append(f"Groups of only one value, which tell nothing of the variance within groups: {single}.")
     return OneWayAnova(
-        F=F,
-        df_between=df_between,
-        df_within=df_within,
-        p=float(stats.f.sf(F, df_between, df_within)),
-        SSB=SSB,
-        SSW=SSW,
-        eta_squared=SSB / total,
-        omega_squared=(SSB - df_between * within) / (total + within),
-        groups=groups,
+        **ratio._asdict(),
+        eta_squared=ratio.SSB / total,
+        omega_squared=(ratio.SSB - ratio.df_between * within) / (total + within),
+        groups=described(found),
+        flags=tuple(flags),
     )

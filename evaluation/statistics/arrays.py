@@ -66,3 +66,9 @@ def is_constant(vector: FloatArray, differences: FloatArray) -> bool:
     """Return whether values differ by no more than the rounding of the values themselves."""
     largest = float(np.abs(vector).max())
     return float(np.abs(differences).max()) <= 4 * float(np.finfo(float).eps) * largest
+
+
+def check_confidence(confidence: float) -> None:
+    """Raise DataError unless a confidence lies between 0 and 1."""
+    if not 0 < confidence < 1:
+        raise DataError(f"confidence is {confidence}, but must lie between 0 and 1.")

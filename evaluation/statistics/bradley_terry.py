@@ -14,6 +14,7 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import finite_array
+from evaluation.statistics.result import Result
 
 _MOST_STEPS = 500
 _LARGEST_COUNT = 1e9
@@ -22,7 +23,7 @@ _ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BradleyTerry:
+class BradleyTerry(Result):
     """Scores of things that were compared two by two.
 
     Attributes
@@ -79,7 +80,7 @@ class BradleyTerry:
         """Return the probability that the first is preferred to the second; 0.5 of a thing and itself."""
         return float(special.expit(self.difference(first, second)[0]))
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return the scores, the highest first, and the test.
 
         For instance ``B = 0.51 (SE 0.20), A = -0.51 (SE 0.20); 40 comparisons, all equal: χ²(1) = 7.05, p = .008``.

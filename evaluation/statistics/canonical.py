@@ -13,13 +13,14 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import centred_columns, constant_columns, finite_array
+from evaluation.statistics.result import Result
 
 # A column that differs from a combination of those before it by less than this share of its own size is taken as one.
 _NEGLIGIBLE = 1e-10
 
 
 @dataclass(frozen=True, kw_only=True)
-class MultivariateTest:
+class MultivariateTest(Result):
     """A test that some canonical correlations are all zero.
 
     Attributes
@@ -43,18 +44,26 @@ class MultivariateTest:
     df2: float | None
     p: float | None
 
-    def summary(self) -> str:
-        """Return the test in APA style, for instance ``Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064``."""
+    def apa(self) -> str:
+        """Return the test as a sentence, for instance ``Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064``."""
         write = wording.share if self.statistic.startswith("Wilks") else wording.number
         name = f"{self.statistic} = {write(self.value)}"
         if self.F is None or self.p is None or self.df1 is None or self.df2 is None:
-            return f"{name} (too few rows for an F)"
+            return name
         ratio = f"F({_degrees(self.df1)}, {_degrees(self.df2)}) = {wording.number(self.F)}"
         return f"{name}, {ratio}, {wording.p_value(self.p)}"
 
+    def to_frame(self) -> pd.DataFrame:
+        """Return the test as a frame of one row; NaN where there is no F."""
+        numbers = {name: getattr(self, name) for name in ("value", "F", "df1", "df2", "p")}
+        return pd.DataFrame(
+            {"statistic": [self.statistic]}
+            | {name: [math.nan if number is None else number] for name, number in numbers.items()}
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CanonicalCorrelation:
+class CanonicalCorrelation(Result):
     """The canonical correlations of two sides, p columns of x and q of y; there are s = min(p, q) pairs of variates.
 
     Columns that combine others do not count in p and q; see `canonical_correlation`.
@@ -97,11 +106,9 @@ class CanonicalCorrelation:
     sequence: tuple[MultivariateTest, ...]
     overall: tuple[MultivariateTest, ...]
 
-    def summary(self) -> str:
-        """Return the first correlation in APA style: ``Rc = .80, Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064``."""
-        text = f"Rc = {wording.share(self.correlations[0])}, {self.sequence[0].summary()}"
-        left_out = ", ".join(self.x_left_out + self.y_left_out)
-        return f"{text} (combinations of other columns, left out: {left_out})" if left_out else text
+    def apa(self) -> str:
+        """Return the first correlation: ``Rc = .80, Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064``."""
+        return f"Rc = {wording.share(self.correlations[0])}, {self.sequence[0].apa()}"
 
     def to_frame(self) -> pd.DataFrame:
         """Return a row for each pair of variates, with the test that its and all later correlations are zero."""
@@ -135,7 +142,7 @@ class CanonicalCorrelation:
 
     def tests_to_frame(self) -> pd.DataFrame:
         """Return a row for each of the four overall tests."""
-        return pd.DataFrame([vars(test) for test in self.overall])
+        return pd.concat([test.to_frame() for test in self.overall], ignore_index=True)
 
 
 def canonical_correlation(
@@ -202,6 +209,7 @@ def canonical_correlation(
     squares = np.where(sines <= tolerance, 1.0, np.minimum(cosines, 1) ** 2)
     remainders = np.where(sines <= tolerance, 0.0, np.where(squares < 0.5, 1 - squares, sines**2))
     x_structure, y_structure = side_x.columns.T @ (side_x.basis @ left), side_y.columns.T @ variates
+    traces_and_root = _traces_and_root(squares, remainders, n=n, p=p, q=q)
     sequence = tuple(_wilks(squares[k:], remainders[k:], n=n, p=p, q=q, before=k) for k in range(len(squares)))
     return CanonicalCorrelation(
         correlations=tuple(np.sqrt(squares).tolist()),
@@ -217,7 +225,8 @@ def canonical_correlation(
         x_redundancy=tuple(((x_structure**2).mean(axis=0) * squares).tolist()),
         y_redundancy=tuple(((y_structure**2).mean(axis=0) * squares).tolist()),
         sequence=sequence,
-        overall=(sequence[0], *_traces_and_root(squares, remainders, n=n, p=p, q=q)),
+        overall=(sequence[0], *traces_and_root),
+        flags=(*_flags(side_x.left_out + side_y.left_out), *(flag for test in traces_and_root for flag in test.flags)),
     )
 
 
@@ -334,13 +343,19 @@ def _hotelling_lawley(value: float, *, N: float, p: int, q: int) -> Multivariate
         return _test(name, value, value * (2 * N + 2) / both, both, 2 * N + 2)
     # McKeon matches the first two moments; with so few rows there is no first moment to match.
     if N <= 0:
-        return MultivariateTest(statistic=name, value=value, F=None, df1=None, df2=None, p=None)
+        return MultivariateTest(
+            statistic=name, value=value, F=None, df1=None, df2=None, p=None, flags=(f"{name}: too few rows for an F.",)
+        )
     df2 = 4 + (both + 2) * 2 * (2 * N + 1) * (N - 1) / (both + 2 + 2 * N * (p + q + 1))
     return _test(name, value, value * 2 * N / (df2 - 2) * df2 / both, both, df2)
 
 
 def _test(statistic: str, value: float, F: float, df1: float, df2: float) -> MultivariateTest:
     return MultivariateTest(statistic=statistic, value=value, F=F, df1=df1, df2=df2, p=float(stats.f.sf(F, df1, df2)))
+
+
+def _flags(left_out: tuple[str, ...]) -> tuple[str, ...]:
+    return (f"Combinations of other columns, left out: {', '.join(left_out)}.",) if left_out else ()
 
 
 def _degrees(df: float) -> str:

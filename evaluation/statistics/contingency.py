@@ -12,10 +12,11 @@ from scipy import optimize, stats
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.matrices import finite_array
+from evaluation.statistics.result import Result
 
 
 @dataclass(frozen=True, kw_only=True)
-class Contingency:
+class Contingency(Result):
     """A contingency table and how strongly its rows and columns belong together.
 
     Attributes
@@ -69,7 +70,7 @@ class Contingency:
         """Number of things."""
         return sum(self.row_sums)
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return the result in APA style, for instance ``χ²(36, N = 213) = 505.54, p < .001, V = .63, purity = .62``.
 
         Where a cell's expected count is below 5 the sentence says so.

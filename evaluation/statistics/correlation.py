@@ -3,17 +3,22 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from scipy import special, stats
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import centred, finite_vector, is_constant
+from evaluation.statistics.arrays import FloatArray, centred, check_confidence, finite_vector, is_constant
+from evaluation.statistics.result import Result
+
+# Closer to 1 than this, which rounding alone may bring about, a correlation counts as perfect.
+_PERFECT = 1e-14
 
 
 @dataclass(frozen=True, kw_only=True)
-class Correlation:
+class Correlation(Result):
     """A Pearson correlation.
 
     Attributes
@@ -40,8 +45,8 @@ class Correlation:
     slope: float
     intercept: float
 
-    def summary(self) -> str:
-        """Return the result as a sentence in APA style, for instance ``r(12) = .87, 95% CI [.63, .96], p < .001``."""
+    def apa(self) -> str:
+        """Return the result as a sentence, for instance ``r(12) = .87, 95% CI [.63, .96], p < .001``."""
         parts = [f"r({self.n - 2}) = {wording.share(self.r)}"]
         if self.ci:
             parts.append(wording.interval(*self.ci, confidence=self.confidence, bounded=True))
@@ -82,7 +87,8 @@ def pearson(x: npt.ArrayLike, y: npt.ArrayLike, *, confidence: float = 0.95) -> 
     Raises
     ------
     DataError
-        If the two differ in length, a value is not a finite number, or `confidence` is not between 0 and 1.
+        If the two differ in length, a value is not a finite number, `confidence` is not between 0 and 1, or the slope
+        would be infinite.
     InsufficientDataError
         If there are fewer than three pairs or one side does not vary.
 
@@ -92,43 +98,95 @@ def pearson(x: npt.ArrayLike, y: npt.ArrayLike, *, confidence: float = 0.95) -> 
     1908, Biometrika 6:302); interval by Fisher (1921), Metron 1:3. Jia et al. (2013), section 5.2, use r to compare the
     PAD that went into a face with the PAD that people see.
     """
-    if not 0 < confidence < 1:
-        raise DataError(f"confidence is {confidence}, but must lie between 0 and 1.")
-    xs, ys = finite_vector(x, name="x"), finite_vector(y, name="y")
-    if xs.size != ys.size:
-        raise DataError(f"x has {xs.size} values and y has {ys.size}, but a correlation needs pairs.")
+    check_confidence(confidence)
+    xs, ys = paired(x, y)
     n = xs.size
-    if n < 3:
-        raise InsufficientDataError(f"A correlation needs at least 3 pairs; there {'is' if n == 1 else 'are'} {n}.")
     (mean_x, dx), (mean_y, dy) = centred(xs), centred(ys)
     for name, values, differences in (("x", xs, dx), ("y", ys, dy)):
         if is_constant(values, differences):
             raise InsufficientDataError(
                 f"All {n} values of {name} are the same, so there is no correlation to compute."
             )
-    size_x, size_y = math.sqrt(dx @ dx), math.sqrt(dy @ dy)
-    r = min(1.0, max(-1.0, float((dx / size_x) @ (dy / size_y))))
-    slope = r * size_y / size_x
+    size_x, size_y = _length(dx), _length(dy)
+    r = float(without_rounding((dx / size_x) @ (dy / size_y)))
+    slope = r * (size_y / size_x)
+    if not math.isfinite(slope):
+        raise DataError("x varies so little beside y that the line's slope is beyond all numbers; use other units.")
     return Correlation(
         r=r,
         n=n,
-        p=_p_value(r, n),
-        ci=_fisher_interval(r, n, confidence),
+        p=float(pearson_p_values(np.array(r), n)),
+        ci=fisher_interval(r, 1 / math.sqrt(n - 3), confidence) if n > 3 else None,
         confidence=confidence,
         slope=slope,
         intercept=mean_y - slope * mean_x,
+        flags=_flags(r, n),
     )
 
 
-def _p_value(r: float, n: int) -> float:
-    # The beta form of the t test, which stays exact for correlations near 1.
-    return float(2 * special.betainc(n / 2 - 1, n / 2 - 1, (1 - abs(r)) / 2))
+def without_rounding(r: npt.ArrayLike) -> FloatArray:
+    """Return correlations with those that only rounding keeps from 1 or -1, or puts beyond, set to it; NaN stays."""
+    values = np.asarray(r, dtype=float)
+    return np.where(np.abs(values) >= 1 - _PERFECT, np.sign(values), values)
 
 
-def _fisher_interval(r: float, n: int, confidence: float) -> tuple[float, float] | None:
-    if n == 3:
-        return None
+def pearson_p_values(r: FloatArray, n: npt.NDArray[np.int64] | int) -> FloatArray:
+    """Return the two-sided p values of Pearson correlations.
+
+    Parameters
+    ----------
+    r : numpy.ndarray
+        Correlations, -1 to 1; NaN gives NaN.
+    n : numpy.ndarray or int
+        Numbers of pairs of values behind them, 3 or more.
+
+    Returns
+    -------
+    numpy.ndarray, shape of r
+        Student's test with n - 2 degrees of freedom, in its beta form, which stays exact for correlations near 1.
+    """
+    half = np.asarray(n, dtype=float) / 2 - 1
+    p: FloatArray = np.minimum(2 * special.betainc(half, half, (1 - np.abs(r)) / 2), 1)
+    return p
+
+
+def fisher_interval(r: float, standard_error: float, confidence: float) -> tuple[float, float]:
+    """Return an interval for a correlation: symmetric around artanh(r), with the standard error on that scale."""
     if abs(r) == 1:
         return (r, r)
-    half = float(stats.norm.ppf((1 + confidence) / 2)) / math.sqrt(n - 3)
+    half = float(stats.norm.ppf((1 + confidence) / 2)) * standard_error
     return math.tanh(math.atanh(r) - half), math.tanh(math.atanh(r) + half)
+
+
+def paired(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return the two sides of a correlation as vectors.
+
+    Raises
+    ------
+    DataError
+        If a value is not a finite number or the two differ in length.
+    InsufficientDataError
+        If there are fewer than three pairs.
+    """
+    xs, ys = finite_vector(x, name="x"), finite_vector(y, name="y")
+    if xs.size != ys.size:
+        raise DataError(f"x has {xs.size} values and y has {ys.size}, but a correlation needs pairs.")
+    if xs.size < 3:
+        verb = "is" if xs.size == 1 else "are"
+        raise InsufficientDataError(f"A correlation needs at least 3 pairs; there {verb} {xs.size}.")
+    return xs, ys
+
+
+def _length(vector: FloatArray) -> float:
+    # Scaled by the largest first, so that squares of small numbers do not vanish.
+    largest = float(np.abs(vector).max())
+    return largest * math.sqrt(float((vector / largest) @ (vector / largest)))
+
+
+def _flags(r: float, n: int) -> tuple[str, ...]:
+    flags = []
+    if n == 3:
+        flags.append("Three pairs give no interval for r.")
+    if abs(r) == 1:
+        flags.append("All pairs lie on one line: check that the two sides are not the same measurement.")
+    return tuple(flags)

@@ -14,6 +14,7 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import centred_columns, finite_array
+from evaluation.statistics.result import Result
 
 About = Literal["points", "mean"]
 """What an ellipse is to cover: a share of the points, or the mean with some confidence."""
@@ -23,7 +24,7 @@ _FLAT = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ellipse:
+class Ellipse(Result):
     """An ellipse (2-D) or ellipsoid (3-D).
 
     Attributes
@@ -112,7 +113,7 @@ class Ellipse:
         outline: FloatArray = self.centre + (circle * self.half_axes) @ self.directions
         return outline
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return the ellipse as a sentence with its centre, half-axes, size and the share of points inside."""
         kind, measure = ("ellipse", "area") if len(self.centre) == 2 else ("ellipsoid", "volume")
         what = f"{100 * self.coverage:g}% {kind}" + (" of the mean" if self.about == "mean" else "")

@@ -77,3 +77,30 @@ def constant_columns(matrix: FloatArray, differences: FloatArray) -> npt.NDArray
     largest = np.abs(matrix).max(axis=0)
     constant: npt.NDArray[np.bool_] = np.abs(differences).max(axis=0) <= 4 * np.finfo(float).eps * largest
     return constant
+
+
+def ratings_table(ratings: npt.ArrayLike) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Return ratings some of which may be missing, and which are there.
+
+    Parameters
+    ----------
+    ratings : array_like, shape (items, raters)
+        Ratings; NaN where a rater did not rate an item.
+
+    Returns
+    -------
+    tuple of numpy.ndarray, both of shape (items, raters)
+        The ratings in a new array, 0 where there is none; and True where there is one.
+
+    Raises
+    ------
+    DataError
+        If they are no table of numbers, or one is infinite or beyond 1e140.
+    """
+    try:
+        table = np.array(ratings, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise DataError("ratings: these values are not all numbers, or the rows differ in length.") from error
+    given = ~np.isnan(table)
+    table[~given] = 0
+    return finite_array(table, axes=("items", "raters"), name="ratings"), given

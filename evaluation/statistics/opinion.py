@@ -11,11 +11,12 @@ from scipy import stats
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import centred, finite_vector
+from evaluation.statistics.arrays import centred, check_confidence, finite_vector, is_constant
+from evaluation.statistics.result import Result
 
 
 @dataclass(frozen=True, kw_only=True)
-class OpinionScore:
+class OpinionScore(Result):
     """A mean opinion score.
 
     Attributes
@@ -39,7 +40,7 @@ class OpinionScore:
     ci: tuple[float, float] | None
     confidence: float
 
-    def summary(self) -> str:
+    def apa(self) -> str:
         """Return the result in APA style, for instance ``M = 3.42, SD = 0.91, n = 30, 95% CI [3.08, 3.76]``."""
         parts = [f"M = {wording.number(self.mean)}"]
         if self.sd is not None:
@@ -89,17 +90,24 @@ def opinion_score(scores: npt.ArrayLike, *, confidence: float = 0.95) -> Opinion
     ----------
     ITU-T Rec. P.800.1 (the term); Student (1908), Biometrika 6:1 (the interval); Jia et al. (2013), section 5.4.
     """
-    _check(confidence)
+    check_confidence(confidence)
     values = finite_vector(scores, name="scores")
     if values.size == 0:
         raise InsufficientDataError("There are no scores, so there is no mean.")
     mean, differences = centred(values)
     n = values.size
     if n == 1:
-        return OpinionScore(mean=mean, sd=None, n=1, ci=None, confidence=confidence)
-    sd = math.sqrt(float(differences @ differences) / (n - 1))
+        why = "There is one score, so there is no standard deviation and no interval."
+        return OpinionScore(mean=mean, sd=None, n=1, ci=None, confidence=confidence, flags=(why,))
+    # In units of the largest difference, so that squares of small numbers do not vanish.
+    largest = float(np.abs(differences).max()) or 1.0
+    relative = differences / largest
+    sd = largest * math.sqrt(float(relative @ relative) / (n - 1))
     half = float(stats.t.ppf((1 + confidence) / 2, n - 1)) * sd / math.sqrt(n)
-    return OpinionScore(mean=mean, sd=sd, n=n, ci=(mean - half, mean + half), confidence=confidence)
+    flags: tuple[str, ...] = ()
+    if is_constant(values, differences):
+        flags = (f"All {n} scores are the same: the interval has no width, which says nothing of its precision.",)
+    return OpinionScore(mean=mean, sd=sd, n=n, ci=(mean - half, mean + half), confidence=confidence, flags=flags)
 
 
 def opinion_table(frame: pd.DataFrame, *, score: str, by: Sequence[str], confidence: float = 0.95) -> pd.DataFrame:
@@ -131,7 +139,7 @@ def opinion_table(frame: pd.DataFrame, *, score: str, by: Sequence[str], confide
     ----------
     As `opinion_score`.
     """
-    _check(confidence)
+    check_confidence(confidence)
     missing = [column for column in [*by, score] if column not in frame.columns]
     if missing:
         raise DataError(f"The frame has no column {', '.join(missing)}; it has {', '.join(map(str, frame.columns))}.")
@@ -142,8 +150,3 @@ def opinion_table(frame: pd.DataFrame, *, score: str, by: Sequence[str], confide
     n = table["n"].to_numpy(dtype=float)
     half = stats.t.ppf((1 + confidence) / 2, n - 1) * table["sd"].to_numpy(dtype=float) / np.sqrt(n)
     return table.assign(ci_low=table["mean"] - half, ci_high=table["mean"] + half)
-
-
-def _check(confidence: float) -> None:
-    if not 0 < confidence < 1:
-        raise DataError(f"confidence is {confidence}, but must lie between 0 and 1.")

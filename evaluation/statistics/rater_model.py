@@ -1,24 +1,43 @@
-"""What single raters are like: bias and inconsistency, scores out of range, agreement with the others."""
+"""What single raters are like: the model of bias and inconsistency."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import pandas as pd
+from scipy import special
 
-from evaluation.errors import DataError, InsufficientDataError
+from evaluation.errors import InsufficientDataError
+from evaluation.statistics import wording
 from evaluation.statistics.alternating_projection import LEAST_VARIANCE, AlternatingProjection, BoolArray, IntArray
-from evaluation.statistics.arrays import FloatArray
-from evaluation.statistics.matrices import finite_array
+from evaluation.statistics.arrays import FloatArray, check_confidence
+from evaluation.statistics.bt500 import RangeCounts, range_counts
+from evaluation.statistics.leave_one_out import deviations, leave_one_out_correlation
+from evaluation.statistics.matrices import ratings_table
+from evaluation.statistics.result import Result
+from evaluation.statistics.threads import one_thread
+
+__all__ = [
+    "LEAST_RATINGS",
+    "RangeCounts",
+    "RaterModel",
+    "deviations",
+    "leave_one_out_correlation",
+    "range_counts",
+    "rater_model",
+]
 
 LEAST_RATINGS = 3
 """Ratings that a rater must share with others, or the model of bias and inconsistency leaves the rater out."""
 
-# Comparisons of sums count as equal what differs by rounding alone.
-_ROUNDING = 1e-9
+# A rater with more than this share of all weight is the solution alone.
+_COLLAPSED = 0.99
+# Ratings that sum to less, as do their squares, are not looked at more closely.
+_LARGEST = 1e140
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RaterModel:
+class RaterModel(Result):
     """Qualities of items, and biases and inconsistencies of raters, that explain ratings best.
 
     Attributes
@@ -30,6 +49,12 @@ class RaterModel:
         the mean 0); NaN for raters with too few ratings.
     inconsistency : numpy.ndarray, shape (raters,)
         Standard deviation of what is left of each rater's ratings, with n; NaN as for the bias.
+    quality_se, bias_se : numpy.ndarray, shapes (items,) and (raters,)
+        Standard errors; NaN as for the estimates.
+    ratings : numpy.ndarray of int, shape (raters,)
+        Ratings of each rater that the model was fitted to.
+    confidence : float
+        Confidence of the intervals.
     group : numpy.ndarray of int, shape (raters,)
         Raters of one number are linked by items that they share, directly or through others; nothing tells the biases
         of different groups apart. -1 for raters with too few ratings.
@@ -45,13 +70,91 @@ class RaterModel:
     quality: FloatArray
     bias: FloatArray
     inconsistency: FloatArray
+    quality_se: FloatArray
+    bias_se: FloatArray
+    ratings: IntArray
+    confidence: float
     group: IntArray
     largest_weight: float
     iterations: int
     converged: bool
 
+    @property
+    def inconsistency_se(self) -> FloatArray:
+        """Standard errors of the inconsistencies, from the information: inconsistency / sqrt(2 n); shape (raters,)."""
+        errors: FloatArray = self.inconsistency / np.sqrt(2 * np.maximum(self.ratings, 1))
+        return errors
 
-def rater_model(ratings: npt.ArrayLike, *, tolerance: float = 1e-8, steps: int = 1000) -> RaterModel:
+    @property
+    def quality_ci(self) -> FloatArray:
+        """Normal intervals of the qualities, shape (items, 2)."""
+        return self._normal(self.quality, self.quality_se)
+
+    @property
+    def bias_ci(self) -> FloatArray:
+        """Normal intervals of the biases, shape (raters, 2)."""
+        return self._normal(self.bias, self.bias_se)
+
+    @property
+    def inconsistency_ci(self) -> FloatArray:
+        """Intervals of the inconsistencies by the chi-square with n degrees of freedom, shape (raters, 2)."""
+        number = np.maximum(self.ratings, 1)
+        tails = np.array([(1 - self.confidence) / 2, (1 + self.confidence) / 2])
+        factors = np.sqrt(number[:, None] / special.chdtri(number[:, None], tails))
+        limits: FloatArray = self.inconsistency[:, None] * factors
+        return limits
+
+    @property
+    def collapsed(self) -> bool:
+        """Whether one rater's ratings are taken for the truth, so that the others' numbers mean nothing."""
+        return self.largest_weight > _COLLAPSED
+
+    def apa(self) -> str:
+        """Return the size of the panel and how far biases and inconsistencies reach."""
+        known = self.group >= 0
+        bias, spread = self.bias[known], self.inconsistency[known]
+        items = int(np.count_nonzero(~np.isnan(self.quality)))
+        return (
+            f"Bias and inconsistency (ITU-T P.910) of {bias.size} raters of {items} items: bias "
+            f"{wording.number(float(bias.min()))} to {wording.number(float(bias.max()))}, "
+            f"SD = {wording.number(float(bias.std()))}, inconsistency {wording.number(float(spread.min()))} to "
+            f"{wording.number(float(spread.max()))}, M = {wording.number(float(spread.mean()))}, "
+            f"mean SE of a quality {wording.number(float(np.nanmean(self.quality_se)), 3)}"
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a row for each parameter: what it is, its number from 0, estimate, standard error and interval."""
+        parts = (
+            ("quality", self.quality, self.quality_se, self.quality_ci),
+            ("bias", self.bias, self.bias_se, self.bias_ci),
+            ("inconsistency", self.inconsistency, self.inconsistency_se, self.inconsistency_ci),
+        )
+        return pd.concat(
+            [
+                pd.DataFrame(
+                    {
+                        "parameter": name,
+                        "number": np.arange(estimate.size),
+                        "estimate": estimate,
+                        "se": se,
+                        "ci_low": ci[:, 0],
+                        "ci_high": ci[:, 1],
+                    }
+                )
+                for name, estimate, se, ci in parts
+            ],
+            ignore_index=True,
+        )
+
+    def _normal(self, estimate: FloatArray, se: FloatArray) -> FloatArray:
+        half = float(special.ndtri((1 + self.confidence) / 2)) * se
+        return np.column_stack([estimate - half, estimate + half])
+
+
+@one_thread()
+def rater_model(
+    ratings: npt.ArrayLike, *, tolerance: float = 1e-8, steps: int = 1000, confidence: float = 0.95
+) -> RaterModel:
     """Return the bias and the inconsistency of each rater, and the qualities of the items freed of them.
 
     The model is x[j, i] = quality[j] + bias[i] + inconsistency[i] * e, where e is normal with variance 1. Its maximum
@@ -66,16 +169,18 @@ def rater_model(ratings: npt.ArrayLike, *, tolerance: float = 1e-8, steps: int =
         Largest change of all qualities (root of the sum of squares) at which the solution is found.
     steps : int
         Largest number of steps.
+    confidence : float
+        Confidence of the intervals, between 0 and 1.
 
     Returns
     -------
     RaterModel
-        The solution.
+        The solution, with standard errors and intervals.
 
     Raises
     ------
     DataError
-        If the ratings are no table of numbers, or infinite.
+        If the ratings are no table of numbers, or infinite, or `confidence` is not between 0 and 1.
     InsufficientDataError
         If no two raters share enough items.
 
@@ -85,209 +190,125 @@ def rater_model(ratings: npt.ArrayLike, *, tolerance: float = 1e-8, steps: int =
     items with others would be fitted without a residual; both are left out of the fit. Such an item then has the rating
     less the rater's bias as its quality.
 
+    Standard errors are those of Li et al., from the second derivatives of the log likelihood by one parameter each:
+    1 / sqrt(sum of 1 / inconsistency squared) over the raters of an item for its quality, inconsistency / sqrt(n) for
+    the bias of a rater of n items.
+
     References
     ----------
     Recommendation ITU-T P.910, bias-subtracted consistency-weighted mean opinion score by alternating projection.
     Li, Bampis, Krasula, Janowski and Katsavounidis (2020), A simple model for subject behavior in subjective
     experiments, Human Vision and Electronic Imaging (arXiv:2004.02067).
     """
+    check_confidence(confidence)
     scores, given = _table(ratings)
+    if given is None:
+        if len(scores) >= LEAST_RATINGS and scores.shape[1] > 1:
+            return _fit(scores, None, None, tolerance=tolerance, steps=steps, confidence=confidence)
+        scores, given = ratings_table(ratings)
     fitted = _linked(given)
     if not fitted.any():
         raise InsufficientDataError(
             f"Bias and inconsistency need two raters or more with at least {LEAST_RATINGS} items in common with others."
         )
-    group = _groups(fitted)
-    items, raters = fitted.any(axis=1), fitted.any(axis=0)
-    fit = AlternatingProjection(scores[np.ix_(items, raters)], fitted[np.ix_(items, raters)])
+    return _fit(scores, given, fitted, tolerance=tolerance, steps=steps, confidence=confidence)
+
+
+def _table(ratings: npt.ArrayLike) -> tuple[FloatArray, BoolArray | None]:
+    """Return as `ratings_table`, but sooner, and None if nothing is missing."""
+    if not isinstance(ratings, np.ndarray) or ratings.dtype.kind not in "iuf" or ratings.ndim != 2:
+        return ratings_table(ratings)
+    scores, given = np.ascontiguousarray(ratings, dtype=float), None
+    # A sum is NaN if one of its terms is.
+    with np.errstate(all="ignore"):
+        sums = np.abs(scores @ np.ones(scores.shape[1]))
+        if not sums.max(initial=0) < _LARGEST:
+            given = ~np.isnan(scores)
+            scores = np.where(given, scores, 0)
+            sums = np.einsum("ji,ji->j", scores, scores)
+    return (scores, given) if sums.max(initial=0) < _LARGEST else ratings_table(ratings)
+
+
+def _fit(
+    scores: FloatArray,
+    given: BoolArray | None,
+    fitted: BoolArray | None,
+    *,
+    tolerance: float,
+    steps: int,
+    confidence: float,
+) -> RaterModel:
+    shape = scores.shape
+    items: BoolArray
+    raters: BoolArray
+    if given is None or fitted is None:
+        group, of_items = np.zeros(shape[1], dtype=np.intp), np.zeros(shape[0], dtype=np.intp)
+        items, raters = np.ones(shape[0], dtype=np.bool_), np.ones(shape[1], dtype=np.bool_)
+        with np.errstate(over="ignore", invalid="ignore"):
+            fit = AlternatingProjection(scores, None)
+        if not fit.squares.max() < _LARGEST:
+            # Ratings that cancelled each other in the sums may still be too large.
+            ratings_table(scores)
+    else:
+        group = _groups(fitted)
+        of_items = group[fitted.argmax(axis=1)]
+        items, raters = np.asarray(fitted.any(axis=1)), np.asarray(fitted.any(axis=0))
+        everything = bool(items.all() and raters.all())
+        places = np.ix_(items, raters)
+        part, linked = (scores, fitted) if everything else (scores[places], fitted[places])
+        fit = AlternatingProjection(part, None if linked.all() else linked)
     iterations, converged = fit.run(tolerance, steps)
-    fit.centre(group[raters], _groups_of_items(fitted, group)[items])
-    bias, inconsistency = np.full((2, scores.shape[1]), np.nan)
-    bias[raters], inconsistency[raters] = fit.bias, fit.inconsistency()
-    quality = np.full(len(scores), np.nan)
+    fit.centre(group[raters], of_items[items])
+    bias, inconsistency, bias_se = np.full((3, shape[1]), np.nan)
+    bias[raters], inconsistency[raters] = fit.bias, fit.inconsistency
+    bias_se[raters] = fit.inconsistency / np.sqrt(fit.per_rater)
+    number = np.zeros(shape[1], dtype=np.intp)
+    number[raters] = fit.per_rater
+    weight = np.zeros(shape[1])
+    weight[raters] = 1 / (fit.inconsistency**2 + LEAST_VARIANCE)
+    quality = np.full(shape[0], np.nan)
     quality[items] = fit.quality
-    weight = np.zeros(raters.size)
-    weight[raters] = 1 / (inconsistency[raters] ** 2 + LEAST_VARIANCE)
-    _rest(quality, scores, given & raters, np.nan_to_num(bias), weight)
-    shares = [weight[group == one].max() / weight[group == one].sum() for one in range(group.max() + 1)]
+    if given is not None:
+        _rest(quality, scores, given & raters, np.nan_to_num(bias), weight)
+    largest = max(float(weight[group == one].max() / weight[group == one].sum()) for one in range(group.max() + 1))
+    precision = np.full(shape[0], weight.sum()) if given is None else given @ weight
     return RaterModel(
         quality=quality,
         bias=bias,
         inconsistency=inconsistency,
+        quality_se=np.where(precision > 0, 1 / np.sqrt(np.where(precision > 0, precision, 1)), np.nan),
+        bias_se=bias_se,
+        ratings=number,
+        confidence=confidence,
         group=group,
-        largest_weight=float(max(shares)),
+        largest_weight=largest,
         iterations=iterations,
         converged=converged,
+        flags=_flags(quality, group, largest, converged=converged),
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RangeCounts:
-    """How many of each rater's scores are far above or below those of the others.
-
-    Attributes
-    ----------
-    above, below : numpy.ndarray of int, shape (raters,)
-        The standard's P and Q.
-    presentations : numpy.ndarray of int, shape (raters,)
-        How many presentations the rater has rated: the standard's J K R where nothing is missing.
-    share : numpy.ndarray, shape (raters,)
-        (P + Q) / presentations; NaN without any.
-    asymmetry : numpy.ndarray, shape (raters,)
-        abs(P - Q) / (P + Q); NaN where both are 0.
-    """
-
-    above: IntArray
-    below: IntArray
-    presentations: IntArray
-    share: FloatArray
-    asymmetry: FloatArray
-
-
-def range_counts(ratings: npt.ArrayLike) -> RangeCounts:
-    """Count each rater's scores that are out of the range of the presentation's scores (ITU-R BT.500).
-
-    A score is out of range if it is 2 standard deviations (n - 1) or more from the presentation's mean, or the root of
-    20 of them where the scores are not normal: where their kurtosis, the fourth moment over the square of the second,
-    is not from 2 to 4. The standard rejects a rater if share > 0.05 and asymmetry < 0.3.
-
-    Parameters
-    ----------
-    ratings : array_like, shape (presentations, raters)
-        Scores; NaN where a rater did not rate a presentation.
-
-    Returns
-    -------
-    RangeCounts
-        Counts for each rater.
-
-    Raises
-    ------
-    DataError
-        If the ratings are no table of numbers, or infinite.
-
-    Notes
-    -----
-    The rater's own score is part of mean and deviation, so that nothing is 2 deviations off among fewer than 6 raters,
-    and nothing the root of 20 among fewer than 22. Where all agree, nothing is out of range.
-
-    References
-    ----------
-    Recommendation ITU-R BT.500-14 (2019), Annex 1, A1-2.3.1.
-    """
-    scores, given = _table(ratings)
-    number = given.sum(axis=1)
-    differences = scores - (scores.sum(axis=1) / np.maximum(number, 1))[:, None]
-    differences[~given] = 0
-    largest = np.abs(differences).max(axis=1, initial=0)
-    varied = largest > _ROUNDING * np.abs(scores).max(axis=1, initial=0)
-    # In units of the largest difference, so that fourth powers of small numbers do not vanish.
-    differences /= np.where(varied, largest, 1)[:, None]
-    squares = differences**2
-    sums = np.where(varied, squares.sum(axis=1), 1)
-    spread = np.sqrt(sums / np.maximum(number - 1, 1))
-    kurtosis = number * np.einsum("ji,ji->j", squares, squares) / sums**2
-    normal = (kurtosis >= 2 * (1 - _ROUNDING)) & (kurtosis <= 4 * (1 + _ROUNDING))
-    # No score is out of the range of a presentation that all rate alike.
-    limit = np.where(varied, np.where(normal, 2.0, np.sqrt(20)) * spread * (1 - _ROUNDING), np.inf)[:, None]
-    above = (differences >= limit).sum(axis=0)
-    below = (differences <= -limit).sum(axis=0)
-    presentations = given.sum(axis=0)
-    out = above + below
-    return RangeCounts(
-        above=above,
-        below=below,
-        presentations=presentations,
-        share=_ratio(out, presentations),
-        asymmetry=_ratio(np.abs(above - below), out),
-    )
-
-
-def leave_one_out_correlation(ratings: npt.ArrayLike) -> FloatArray:
-    """Return the correlation of each rater with the mean of the others.
-
-    Parameters
-    ----------
-    ratings : array_like, shape (items, raters)
-        Ratings; NaN where a rater did not rate an item.
-
-    Returns
-    -------
-    numpy.ndarray, shape (raters,)
-        Pearson's r over the items that the rater and another one rated; NaN with fewer than three of them, or where the
-        rater or the mean of the others does not vary.
-
-    Raises
-    ------
-    DataError
-        If the ratings are no table of numbers, or infinite.
-    """
-    scores, given = _table(ratings)
-    others = given.sum(axis=1, keepdims=True) - given
-    shared = given & (others > 0)
-    mean = (scores.sum(axis=1, keepdims=True) - scores) / np.maximum(others, 1)
-    number = shared.sum(axis=0)
-    own, own_constant = _centred_where(scores, shared, number)
-    rest, rest_constant = _centred_where(mean, shared, number)
-    product = np.einsum("ji,ji->i", own, rest)
-    norm = np.sqrt(np.einsum("ji,ji->i", own, own) * np.einsum("ji,ji->i", rest, rest))
-    known = (number >= 3) & ~own_constant & ~rest_constant
-    result = np.full(number.size, np.nan)
-    result[known] = np.clip(product[known] / norm[known], -1, 1)
-    return result
-
-
-def deviations(ratings: npt.ArrayLike) -> FloatArray:
-    """Return each rater's mean difference from the items' means.
-
-    Where everybody rated everything this is the rater's mean less the mean of all; with missing ratings it does not
-    depend on which items a rater happened to get.
-
-    Parameters
-    ----------
-    ratings : array_like, shape (items, raters)
-        Ratings; NaN where a rater did not rate an item.
-
-    Returns
-    -------
-    numpy.ndarray, shape (raters,)
-        Mean over the items that the rater and another one rated; NaN without any.
-
-    Raises
-    ------
-    DataError
-        If the ratings are no table of numbers, or infinite.
-    """
-    scores, given = _table(ratings)
-    number = given.sum(axis=1, keepdims=True)
-    shared = given & (number > 1)
-    differences = np.where(shared, scores - scores.sum(axis=1, keepdims=True) / np.maximum(number, 1), 0)
-    return _ratio(differences.sum(axis=0), shared.sum(axis=0))
-
-
-def _table(ratings: npt.ArrayLike) -> tuple[FloatArray, BoolArray]:
-    """Return the ratings with 0 for those that are missing, and which are there."""
-    try:
-        table = np.array(ratings, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise DataError("ratings: these values are not all numbers, or the rows differ in length.") from error
-    given = ~np.isnan(table)
-    table[~given] = 0
-    return finite_array(table, axes=("items", "raters"), name="ratings"), given
-
-
-def _ratio(part: npt.ArrayLike, whole: IntArray) -> FloatArray:
-    result: FloatArray = np.where(whole > 0, np.asarray(part) / np.maximum(whole, 1), np.nan)
-    return result
-
-
-def _centred_where(values: FloatArray, where: BoolArray, number: IntArray) -> tuple[FloatArray, BoolArray]:
-    """Return differences from the columns' means, scaled by the largest, and which columns do not vary."""
-    means = np.where(where, values, 0).sum(axis=0) / np.maximum(number, 1)
-    differences = np.where(where, values - means, 0)
-    largest = np.abs(differences).max(axis=0, initial=0)
-    constant: BoolArray = largest <= _ROUNDING * np.where(where, np.abs(values), 0).max(axis=0, initial=0)
-    return differences / np.where(constant, 1, largest), constant
+def _flags(quality: FloatArray, group: IntArray, largest: float, *, converged: bool) -> tuple[str, ...]:
+    flags = []
+    if not converged:
+        flags.append("The qualities had not come to rest after the last step; more steps are needed.")
+    if largest > _COLLAPSED:
+        flags.append(
+            "The solution has collapsed: one rater's ratings are taken for the truth, which happens with few raters; "
+            "neither inconsistencies nor standard errors can be trusted."
+        )
+    if group.max() > 0:
+        flags.append(
+            f"The raters fall into {group.max() + 1} groups without a common item; biases and qualities of different "
+            "groups cannot be compared."
+        )
+    out = int(np.count_nonzero(group < 0))
+    if out:
+        flags.append(f"{out} of {group.size} raters share fewer than {LEAST_RATINGS} items with others: left out.")
+    unknown = int(np.count_nonzero(np.isnan(quality)))
+    if unknown:
+        flags.append(f"{unknown} of {quality.size} items have no rating by a rater of the model, and so no quality.")
+    return tuple(flags)
 
 
 def _linked(given: BoolArray) -> BoolArray:
@@ -295,8 +316,8 @@ def _linked(given: BoolArray) -> BoolArray:
     linked = given.copy()
     while True:
         before = np.count_nonzero(linked)
-        linked &= (linked.sum(axis=1) > 1)[:, None]
-        linked &= linked.sum(axis=0) >= LEAST_RATINGS
+        linked &= (np.count_nonzero(linked, axis=1) > 1)[:, None]
+        linked &= np.count_nonzero(linked, axis=0) >= LEAST_RATINGS
         if np.count_nonzero(linked) == before:
             return linked
 
@@ -316,14 +337,10 @@ def _groups(linked: BoolArray) -> IntArray:
     return group
 
 
-def _groups_of_items(linked: BoolArray, group: IntArray) -> IntArray:
-    """Return the group of each item's raters; that of the first rater for an item without any."""
-    numbers: IntArray = group[linked.argmax(axis=1)]
-    return numbers
-
-
 def _rest(quality: FloatArray, scores: FloatArray, given: BoolArray, bias: FloatArray, weight: FloatArray) -> None:
     """Fill in the qualities of items that the fit left out, from what fitted raters said of them."""
     left = np.isnan(quality) & given.any(axis=1)
+    if not left.any():
+        return
     weights = given[left] * weight
     quality[left] = ((scores[left] - bias) * weights).sum(axis=1) / weights.sum(axis=1)

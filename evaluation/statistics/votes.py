@@ -1,16 +1,18 @@
 """Votes for categories: how many raters chose each, and which was chosen most."""
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
+from evaluation.statistics.result import Result
 
 
 @dataclass(frozen=True, kw_only=True)
-class Votes:
+class Votes(Result):
     """How raters chose among categories.
 
     Attributes
@@ -48,8 +50,8 @@ class Votes:
         """Tell whether one category has more than half of the votes."""
         return 2 * max(self.counts) > self.n
 
-    def summary(self) -> str:
-        """Return the result as text, for instance ``majority Happy (6 of 9, share .67)``."""
+    def apa(self) -> str:
+        """Return the result in words, for instance ``majority Happy (6 of 9, share .67)``."""
         most = max(self.counts)
         figures = f"{most} of {self.n}, share {wording.share(most / self.n)}"
         if self.majority is not None:
@@ -98,7 +100,39 @@ def votes(labels: Mapping[int, str], values: Iterable[int]) -> Votes:
             known = ", ".join(str(one) for one in labels)
             raise DataError(f"There is a vote for {value!r}, which is no category; there are {known}.")
         counts[value] += 1
-    total = sum(counts.values())
+    return votes_of_counts(list(labels.values()), list(counts.values()))
+
+
+def votes_of_counts(labels: Sequence[str], counts: Sequence[int]) -> Votes:
+    """Return votes that were counted already.
+
+    Parameters
+    ----------
+    labels : sequence of str, length k
+        The name of each category; no name twice.
+    counts : sequence of int, length k
+        Votes for each, 0 or more.
+
+    Returns
+    -------
+    Votes
+        Counts, shares and the majority.
+
+    Raises
+    ------
+    DataError
+        If the two differ in length, a count is no whole number of 0 or more, or two categories have the same name.
+    InsufficientDataError
+        If there are no votes.
+    """
+    if len(labels) != len(counts):
+        raise DataError(f"There are {len(labels)} categories, but {len(counts)} counts.")
+    if len(set(labels)) < len(labels):
+        raise DataError("Two categories have the same name, but each must have its own.")
+    for label, count in zip(labels, counts, strict=True):
+        if not (math.isfinite(count) and count >= 0 and count == int(count)):
+            raise DataError(f"{label} has {count} votes, but must have a whole number of 0 or more.")
+    total = sum(int(count) for count in counts)
     if not total:
         raise InsufficientDataError("There are no votes; at least one is needed.")
-    return Votes(labels=tuple(labels.values()), counts=tuple(counts.values()), n=total)
+    return Votes(labels=tuple(labels), counts=tuple(int(count) for count in counts), n=total)

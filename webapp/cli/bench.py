@@ -28,6 +28,7 @@ from synth.render import Renderer
 from synth.speech.voices import forget_speech
 from synth.text.analysis import guess_language
 from synth.video import VideoWriter
+from webapp.cli.bench_statistics import statistics
 from webapp.cli.bench_study import study
 from webapp.cli.bench_training import train
 from webapp.cli.context import echo_json
@@ -61,6 +62,7 @@ def bench() -> None:
 
 bench.add_command(train)
 bench.add_command(study)
+bench.add_command(statistics)
 
 
 @bench.command()

@@ -27,6 +27,7 @@ COMMANDS = {
     "head": "webapp.cli.head:head",
     "identities": "webapp.cli.faces:identities",
     "models": "webapp.cli.models:models",
+    "power": "webapp.cli.power:power",
     "report": "webapp.cli.results:report",
     "rounds": "webapp.cli.rounds:rounds",
     "say": "webapp.cli.say:say",

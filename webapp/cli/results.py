@@ -1,11 +1,11 @@
 """``padlab report`` and ``padlab export``: what a study says, and its data."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
-from evaluation.report import html, tables
-from evaluation.report.analysis import StudyReport
+from evaluation.report import bundle, tables
 from webapp.cli.context import open_database
 from webapp.errors import ConfigError
 from webapp.services import exports, results
@@ -17,44 +17,76 @@ FOLDER = click.Path(path_type=Path, file_okay=False)
 @click.argument("slug")
 @click.option("--part", help="Only this part of the study; left out, all parts, one after the other.")
 @click.option(
-    "--out", type=FOLDER, help="Write each report with figures to OUT/report.html (report-PART.html) as well."
+    "--out",
+    type=FOLDER,
+    help="Write the full report into this folder: report.html, figures (SVG, PNG), tables (CSV, LaTeX), methods.txt.",
 )
 def report(slug: str, part: str | None, out: Path | None) -> None:
-    """Print the statistics of the study SLUG: evaluated PAD, opinion scores, votes, preferences, screening.
+    """Print the main results of the study SLUG: evaluated PAD, opinion scores, votes, preferences, screening.
 
-    With --out the report of a study of several parts is one file for each part: OUT/report-PART.html.
+    With --out the full report is written: comparisons of the conditions with every unit, mixed models, agreement,
+    raters, scale quality and precision besides. That of a study of several parts has a page for each part,
+    report-PART.html, and its files in OUT/PART. papers.html sets the papers' printed tables beside padlab's.
     """
     _, database = open_database()
     with database.read() as session:
-        found = results.reports(session, slug) if part is None else {part: results.report(session, slug, part)}
-    click.echo("\n".join(tables.to_text(one) for one in found.values()))
+        found = (
+            results.full_reports(session, slug) if part is None else {part: results.full_report(session, slug, part)}
+        )
+    click.echo("\n".join(tables.to_text(one.report) for one in found.values()))
     if out is not None:
-        for name, one in found.items():
-            click.echo(f"Written: {_write(one, out / ('report.html' if len(found) == 1 else f'report-{name}.html'))}")
+        written = _write(bundle.study_files(found), out)
+        pages = [str(path) for path in written if path.suffix == ".html"]
+        click.echo(f"Written: {', '.join(pages)}, and {len(written) - len(pages)} files of figures and tables")
 
 
-def _write(report: StudyReport, path: Path) -> Path:
+def _write(files: Iterable[tuple[str, bytes]], folder: Path) -> list[Path]:
+    paths = []
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(html.render(report), encoding="utf-8")
+        for name, content in files:
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+            paths.append(path)
     except OSError as error:
-        raise ConfigError(f"{path} cannot be written ({error.strerror}); name another folder with --out") from error
-    return path
+        raise ConfigError(f"{folder} cannot be written ({error.strerror}); name another folder with --out") from error
+    return paths
+
+
+def _formats(_: click.Context, option: click.Parameter, value: str) -> tuple[str, ...]:
+    """Return the formats named, each once."""
+    chosen = tuple(dict.fromkeys(name.strip().lower() for name in value.split(",")))
+    for name in chosen:
+        if name not in exports.FORMATS:
+            raise click.BadParameter(
+                f"'{name}' is no format; it takes {', '.join(exports.FORMATS)}, or several with commas between them",
+                param=option,
+            )
+    return chosen
 
 
 @click.command()
 @click.argument("slug")
-@click.option("--out", type=FOLDER, help="Write all tables as CSV files into this folder.")
-@click.option("--format", "formats", default="csv", show_default=True, help="Format of the files: csv.")
-def export(slug: str, out: Path | None, formats: str) -> None:
-    """Export the data of the study SLUG as CSV: all tables with --out, the responses alone to standard output."""
-    if formats != "csv":
-        raise click.BadParameter(f"'{formats}' is not written yet; use csv", param_hint="--format")
+@click.option("--out", type=FOLDER, help="Write all tables into this folder.")
+@click.option(
+    "--format",
+    "formats",
+    default="csv",
+    show_default=True,
+    callback=_formats,
+    help=f"Formats of the files, with commas between them: {', '.join(exports.FORMATS)}.",
+)
+def export(slug: str, out: Path | None, formats: tuple[str, ...]) -> None:
+    """Export the data of the study SLUG: all tables with --out, the responses alone to standard output."""
+    printed = {"csv": exports.to_csv, "json": exports.to_json}
+    if out is None and (len(formats) > 1 or formats[0] not in printed):
+        raise click.UsageError("Only csv or json can be printed, one of them; give --out DIR to write files.")
     _, database = open_database()
     with database.read() as session:
         frames = exports.frames(session, slug)
+        labels = exports.value_labels(session, slug)
     if out is None:
-        click.echo(exports.to_csv(frames["responses"]), nl=False)
+        click.echo(printed[formats[0]](frames["responses"]), nl=False)
         return
-    for path in exports.write_csv(frames, out):
+    for path in exports.write(frames, out, formats, labels=labels):
         click.echo(f"Written: {path}")

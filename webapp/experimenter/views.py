@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from collections.abc import Iterable
 from typing import Any
 
 from flask import Blueprint, Response, flash, redirect, render_template, request, url_for
@@ -10,7 +11,7 @@ from flask_login import current_user, login_user, logout_user
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response as BaseResponse
 
-from evaluation.report import figures, html, tables
+from evaluation.report import bundle, figures, full_html, tables
 from webapp import locale, security
 from webapp.errors import NotFoundError
 from webapp.experimenter.login import Account, login_manager
@@ -124,7 +125,24 @@ def figure(slug: str, name: str) -> Response:
 def report(slug: str) -> Response:
     """Send the whole report of a part (the first unless one is named) as one file."""
     with parts().database.read() as db:
-        response = Response(html.render(results.report(db, slug, request.args.get("part"))), mimetype="text/html")
+        page = full_html.render(results.full_report(db, slug, request.args.get("part")), linked=False)
+    response = Response(page, mimetype="text/html")
+    response.headers["Content-Security-Policy"] = security.REPORT_POLICY
+    return response
+
+
+@blueprint.get("/<slug>/report.zip")
+def report_files(slug: str) -> Response:
+    """Send the reports on all parts with their figures and tables in one archive."""
+    with parts().database.read() as db:
+        found = results.full_reports(db, slug)
+    return _archive(bundle.study_files(found), slug, f"{slug}-report.zip")
+
+
+@blueprint.get("/papers.html")
+def papers_page() -> Response:
+    """Send the page that sets the papers' printed tables beside padlab's."""
+    response = Response(bundle.papers_page()[1], mimetype="text/html")
     response.headers["Content-Security-Policy"] = security.REPORT_POLICY
     return response
 
@@ -134,11 +152,17 @@ def export_all(slug: str) -> Response:
     """Send all tables as CSV in one archive."""
     with parts().database.read() as db:
         frames = exports.frames(db, slug)
+    return _archive(
+        ((f"{name}.csv", exports.to_csv(one).encode()) for name, one in frames.items()), slug, f"{slug}.zip"
+    )
+
+
+def _archive(files: Iterable[tuple[str, bytes]], folder: str, name: str) -> Response:
     archive = io.BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as out:
-        for name, frame in frames.items():
-            out.writestr(f"{slug}/{name}.csv", exports.to_csv(frame))
-    return _attachment(archive.getvalue(), "application/zip", f"{slug}.zip")
+        for path, content in files:
+            out.writestr(f"{folder}/{path}", content)
+    return _attachment(archive.getvalue(), "application/zip", name)
 
 
 def _attachment(body: bytes, mimetype: str, name: str) -> Response:

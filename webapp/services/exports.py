@@ -1,7 +1,8 @@
 """Exports: the tables that other programs read."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import MappingProxyType
 
 import pandas as pd
@@ -9,12 +10,15 @@ from sqlalchemy.orm import Session
 
 from evaluation.annotation.discussion import DISCUSSION
 from evaluation.instruments import CodebookRow, TextItem
-from evaluation.report import export
+from evaluation.report import export, table_files, typed_columns
 from evaluation.responses import DIMENSIONS
 from evaluation.study import StudySpec
 from webapp.errors import ConfigError
 from webapp.services import collected, export_tables, raters, studies, trial_table
 from webapp.services.counting import statistics_frame
+
+FORMATS = table_files.FORMATS
+to_csv, to_json = table_files.to_csv, table_files.to_json
 
 SCORE_COLUMNS = MappingProxyType(
     {
@@ -29,9 +33,18 @@ SCORE_COLUMNS = MappingProxyType(
 )
 """The columns of the table of scores but the scores, which the instruments explain."""
 
+ITEM_COLUMNS = MappingProxyType(
+    {
+        **{name: collected.ANSWER_COLUMNS[name] for name in ("participant", "part", "trial", "kind", "round")},
+        **{name: collected.ANSWER_COLUMNS[name] for name in ("stimulus", "condition", "clip", "word")},
+    }
+)
+"""The columns of the table of items but the items, which the instruments explain."""
+
 _COLUMNS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "responses": collected.ANSWER_COLUMNS,
+        "items": ITEM_COLUMNS,
         "scores": SCORE_COLUMNS,
         "trials": trial_table.TRIAL_COLUMNS,
         "participants": export_tables.PARTICIPANT_COLUMNS,
@@ -42,6 +55,19 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = MappingProxyType(
         "audit": export_tables.AUDIT_COLUMNS,
     }
 )
+
+# What the columns hold, for tables in which that cannot be told because a column is empty.
+_INTEGERS = frozenset(
+    (
+        *("participant", "trial", "round", "repeats", "clip", "word", "place", "slot", "plays", "page_ms"),
+        *("samples", "reannotated", "raters", "finished"),
+    )
+)
+_NUMBERS = frozenset(
+    ("seconds", "watched", "media_s", "value", "limit", "agreed", "sd", "pairwise_r", "largest_p", "rating")
+)
+_TRUTHS = frozenset(("flipped", "accepted", "used", "fails", "complete"))
+_MOMENTS = frozenset(("at", "consented_at", "completed_at", "withdrawn_at", "shown_at", "answered_at"))
 
 # What is left out of each table when a study does not share it.
 _TIMES = MappingProxyType(
@@ -61,8 +87,8 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
     Returns
     -------
     dict
-        responses, scores, trials, participants, playback (if shared), annotation and rounds (if a part is annotated),
-        screening, audit, and the codebook, which explains every column of the others.
+        responses, items, scores, trials, participants, playback (if shared), annotation and rounds (if a part is
+        annotated), screening, audit, and the codebook, which explains every column of the others.
 
     Raises
     ------
@@ -73,8 +99,10 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
     spec = studies.spec_of(study)
     rows = collected.read(session, study)
     screenings = raters.screenings(session, study, rows, [part.name for part in spec.all_parts])
+    answers = _responses(spec, collected.as_frame(rows))
     tables = {
-        "responses": _responses(spec, collected.as_frame(rows)),
+        "responses": answers,
+        "items": _items(spec, answers),
         "scores": _scores(spec, rows),
         "trials": trial_table.trials(session, slug),
         "participants": export_tables.participants(session, study, screenings),
@@ -89,7 +117,17 @@ def frames(session: Session, slug: str) -> dict[str, pd.DataFrame]:
     for shared, columns in ((spec.share.times, _TIMES), (spec.share.playback, _PLAYED), (spec.share.panel_id, _PANEL)):
         for name, left_out in columns.items() if not shared else ():
             tables[name] = tables[name].drop(columns=left_out)
+    tables = {name: _typed(name, table) for name, table in tables.items()}
     return {**tables, "codebook": _codebook(spec, tables)}
+
+
+def _typed(name: str, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table whose empty columns have the type that they have when they are filled."""
+    unknown = {column for column in table if table[column].dtype == object and table[column].isna().all()}
+    # In the table of trials this is a digest, elsewhere a place.
+    unknown -= {"clip"} if name == "trials" else set()
+    kinds = ((_INTEGERS, "Int64"), (_NUMBERS, "float64"), (_TRUTHS, "boolean"), (_MOMENTS, "datetime64[us, UTC]"))
+    return table.astype({column: dtype for names, dtype in kinds for column in unknown & names})
 
 
 def _responses(spec: StudySpec, answers: pd.DataFrame) -> pd.DataFrame:
@@ -105,6 +143,33 @@ def _responses(spec: StudySpec, answers: pd.DataFrame) -> pd.DataFrame:
 
 def _joined(answer: object) -> object:
     return ";".join(map(str, answer)) if isinstance(answer, tuple) else answer
+
+
+def _asked(spec: StudySpec) -> list[str]:
+    """Return the names of all instruments of a study, also those asked before and after, in the order of the parts."""
+    parts = spec.all_parts
+    uses = [name for part in parts for name in (*part.before, *(use.use for use in part.instruments), *part.after)]
+    return list(dict.fromkeys([*uses, *(told.instrument for part in parts for told in part.instructed)]))
+
+
+def _items(spec: StudySpec, answers: pd.DataFrame) -> pd.DataFrame:
+    """Return the keyed answers with a column for each item: one row for each clip, or word, of each trial."""
+    place = ["participant", "trial", "clip", "word"]
+    order = answers[place].fillna(0).astype("int64")
+    row = order.groupby(place, sort=True).ngroup().to_numpy()
+    first = pd.Series(row).drop_duplicates().sort_values().index
+    table = answers.loc[first, list(ITEM_COLUMNS)].reset_index(drop=True)
+    names = answers["instrument"].astype("category"), answers["item"].astype("category")
+    columns = {}
+    for instrument in [*map(spec.instrument, _asked(spec)), DISCUSSION]:
+        of_instrument = (names[0] == instrument.name).to_numpy()
+        for item in instrument.items:
+            chosen = of_instrument & (names[1] == item.id).to_numpy()
+            if chosen.any():
+                values = pd.Series(index=table.index, dtype=object)
+                values.iloc[row[chosen]] = answers["keyed"].to_numpy()[chosen]
+                columns[f"{instrument.name}.{item.id}"] = typed_columns.plain(values.to_frame()).iloc[:, 0]
+    return pd.concat([table, pd.DataFrame(columns, index=table.index)], axis=1)
 
 
 def _scores(spec: StudySpec, rows: pd.DataFrame) -> pd.DataFrame:
@@ -124,27 +189,62 @@ def _codebook(spec: StudySpec, tables: Mapping[str, pd.DataFrame]) -> pd.DataFra
         for name, text in texts.items()
         if table in tables and name in tables[table].columns
     ]
-    return pd.DataFrame([*columns, *export.item_rows(spec)], columns=list(CodebookRow._fields))
+    items = export.item_rows(spec)
+    known = {row.variable for row in items}
+    # In the table of items each clip or word has a row of its own, and the column no number.
+    numbered = [row._replace(variable=row.variable.removesuffix("-k")) for row in items if row.variable.endswith("-k")]
+    numbered = [row for row in numbered if row.variable in tables["items"] and row.variable not in known]
+    return pd.DataFrame([*columns, *items, *numbered], columns=list(CodebookRow._fields))
 
 
-def to_csv(frame: pd.DataFrame) -> str:
-    """Write a table as CSV (RFC 4180 quoting, UTF-8, a point for decimals, empty for missing)."""
-    return frame.to_csv(index=False, lineterminator="\n", date_format="%Y-%m-%dT%H:%M:%S.%fZ")
+def value_labels(session: Session, slug: str) -> dict[str, dict[int, str]]:
+    """Return what the values of a study's items stand for, by ``INSTRUMENT.ITEM``, for `write`.
+
+    Raises
+    ------
+    NotFoundError
+        If there is no such study.
+    """
+    spec = studies.spec_of(studies.find(session, slug))
+    found: dict[str, dict[int, str]] = {}
+    for name in _asked(spec):
+        found |= typed_columns.value_labels(spec.instrument(name))
+    return found
 
 
-def write_csv(tables: dict[str, pd.DataFrame], folder: Path) -> list[Path]:
-    """Write each table to ``folder/NAME.csv`` and return the paths.
+def write(
+    tables: Mapping[str, pd.DataFrame],
+    folder: Path,
+    formats: Sequence[str],
+    *,
+    labels: Mapping[str, Mapping[int, str]] = MappingProxyType({}),
+) -> list[Path]:
+    """Write the tables into a folder, in one or several of `FORMATS`, and return the paths.
+
+    Files appear when all are complete; those of the same name are replaced, others stay.
+
+    Parameters
+    ----------
+    tables : mapping of str to pandas.DataFrame
+        As `frames` returns them.
+    folder : pathlib.Path
+        Made if it is not there.
+    formats : sequence of str
+        Some of `FORMATS`.
+    labels : mapping of str to mapping, optional
+        As `value_labels` returns them.
 
     Raises
     ------
     ConfigError
         If the folder cannot be written.
+    DataError
+        If a table does not fit into a format, for instance more than 1,048,575 rows into xlsx.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        paths = [folder / f"{name}.csv" for name in tables]
-        for path, frame in zip(paths, tables.values(), strict=True):
-            path.write_text(to_csv(frame), encoding="utf-8")
+        with TemporaryDirectory(dir=folder, prefix=".export-") as unfinished:
+            written = table_files.write(tables, Path(unfinished), formats, labels=labels)
+            return [path.replace(folder / path.name) for path in written]
     except OSError as error:
         raise ConfigError(f"{folder} cannot be written ({error.strerror}); name another folder with --out") from error
-    return paths

@@ -8,7 +8,7 @@ from weakref import WeakKeyDictionary
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from evaluation.report.analysis import StudyReport
+from evaluation.report.full import FullReport
 from webapp.models import AuditEntry, Response, Study
 
 REPORTS = 16
@@ -22,10 +22,10 @@ class ReportCache:
     """Reports of this process by what they were made from; the one that was used longest ago leaves first."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[Hashable, StudyReport] = OrderedDict()
+        self._kept: OrderedDict[Hashable, FullReport] = OrderedDict()
         self._lock = Lock()
 
-    def get(self, key: Hashable, make: Callable[[], StudyReport]) -> StudyReport:
+    def get(self, key: Hashable, make: Callable[[], FullReport]) -> FullReport:
         """Return the report that is kept under a key, or make it; whoever asks meanwhile waits for it."""
         with self._lock:
             found = self._kept.pop(key, None)
@@ -37,7 +37,7 @@ class ReportCache:
             return found
 
     def _rows(self) -> int:
-        return sum(len(report.scores) for report in self._kept.values())
+        return sum(len(full.report.scores) for full in self._kept.values())
 
 
 _CACHES: WeakKeyDictionary[object, ReportCache] = WeakKeyDictionary()

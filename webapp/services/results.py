@@ -8,6 +8,7 @@ import pandas as pd
 from sqlalchemy.orm import Session
 
 from evaluation.report.analysis import StudyReport, analyse
+from evaluation.report.full import FullReport
 from evaluation.study import StudySpec
 from webapp.errors import NotFoundError
 from webapp.models import Study
@@ -36,6 +37,8 @@ __all__ = [
     "TRIAL_COLUMNS",
     "answers",
     "checks",
+    "full_report",
+    "full_reports",
     "preferences",
     "repeats",
     "report",
@@ -101,6 +104,11 @@ def report(session: Session, slug: str, part: str | None = None) -> StudyReport:
     NotFoundError
         If there is no such study or part.
     """
+    return full_report(session, slug, part).report
+
+
+def full_report(session: Session, slug: str, part: str | None = None) -> FullReport:
+    """Return the report on a part with everything; parameters and errors as `report`."""
     spec = studies.spec_of(studies.find(session, slug))
     name = spec.all_parts[0].name if part is None else part
     _require(spec, name)
@@ -115,11 +123,16 @@ def reports(session: Session, slug: str) -> dict[str, StudyReport]:
     NotFoundError
         If there is no such study.
     """
+    return {name: full.report for name, full in full_reports(session, slug).items()}
+
+
+def full_reports(session: Session, slug: str) -> dict[str, FullReport]:
+    """Return the reports on all parts with everything; see `reports`."""
     spec = studies.spec_of(studies.find(session, slug))
     return _reports(session, slug, [part.name for part in spec.all_parts])
 
 
-def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, StudyReport]:
+def _reports(session: Session, slug: str, parts: Sequence[str]) -> dict[str, FullReport]:
     study = studies.find(session, slug)
     spec = studies.spec_of(study)
     state = report_cache.state(session, study)
@@ -137,7 +150,7 @@ class _Evidence:
     def _rows(self) -> pd.DataFrame:
         return collected.read(self._session, self._study)
 
-    def analyse(self, part: str) -> StudyReport:
+    def analyse(self, part: str) -> FullReport:
         spec, rows = self._spec, self._rows
         again = spec.part(part).repeats is not None
         made = analyse(
@@ -147,7 +160,7 @@ class _Evidence:
             repeats=repeats_among(self._session, self._study, rows, part) if again else None,
             screening=screenings(self._session, self._study, rows, [part])[part],
         )
-        return replace(made, study=spec)
+        return FullReport(replace(made, study=spec))
 
 
 def _require(spec: StudySpec, part: str) -> None:

@@ -6,8 +6,9 @@ import pandas as pd
 import pytest
 
 from evaluation.errors import EvaluationError
-from evaluation.report import figures, tables
+from evaluation.report import figures
 from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
+from evaluation.report.full import FullReport
 from evaluation.simulate import simulate_responses
 
 EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
@@ -90,7 +91,7 @@ def test_texts_of_a_study_are_no_markup_and_no_formula(demo, answers):
 
 
 def test_each_figure_belongs_to_a_section(report):
-    assert set(figures.NAMES) <= {section.name for section in tables.sections(report)}
+    assert set(figures.NAMES) <= {section.name for section in FullReport(report).sections}
 
 
 def test_an_unknown_figure_is_named_with_those_there_are(report):

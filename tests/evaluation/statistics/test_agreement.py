@@ -26,7 +26,7 @@ def test_by_hand():
 
 def test_the_sentence_and_the_frame():
     found = annotation_agreement(BY_HAND, dimensions=["P"])
-    assert found.summary() == "P: SD = 1.57, mean pairwise r = .73 (largest p = .400)"
+    assert found.apa() == found.summary() == "P: SD = 1.57, mean pairwise r = .73 (largest p = .400)"
     row = found.to_frame().iloc[0]
     assert (row["dimension"], row["items"], row["pairwise_r"]) == ("P", 4, found["P"].pairwise_r)
 
@@ -72,7 +72,8 @@ class TestConstantRaters:
         assert agreement.constant_raters == (3,)
         assert agreement.pairwise_r == pytest.approx((1 + 0.6 + 0.6) / 3)
         assert np.isnan(agreement.correlations[2]).all()
-        assert agreement.summary().endswith("left out of r: 3")
+        assert agreement.summary().endswith("raters who gave one rating throughout, left out of r: 3.")
+        assert found.flags == agreement.flags
         # The deviation is over all raters, the constant one among them.
         assert agreement.sd == pytest.approx(
             np.std([[1, 2, 0.5, 2], [2, 4, 0.5, 1], [3, 6, 0.5, 4], [4, 8, 0.5, 3]], axis=1, ddof=1).mean()

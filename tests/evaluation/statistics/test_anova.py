@@ -2,13 +2,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from evaluation.errors import DataError, InsufficientDataError
-from evaluation.statistics.anova import one_way, one_way_from_summary, pooled_sd_from_f
+from evaluation.statistics.anova import one_way, one_way_from_summary, one_way_of_matrix, pooled_sd_from_f
 
 NIST = ["SiRstv", "SmLs01", "SmLs03", "SmLs04", "SmLs06", "SmLs07", "SmLs09"]
 KEYS = {
@@ -79,7 +79,7 @@ def test_mtap_2013_table_10(case, experiment):
 
 def test_the_sentence_is_in_apa_style(case):
     found = one_way(grouped(case("plantgrowth")["data"]))
-    assert found.summary() == "F(2, 27) = 4.85, p = .016, η² = .26, ω² = .20"
+    assert found.apa() == "F(2, 27) = 4.85, p = .016, η² = .26, ω² = .20"
 
 
 def test_the_table_adds_up(case):
@@ -133,9 +133,81 @@ def test_a_summary_is_as_good_as_the_values(data):
     assert again.omega_squared == pytest.approx(found.omega_squared, rel=1e-6, abs=1e-9)
 
 
+@pytest.mark.parametrize("name", [f"nist_{name}" for name in NIST])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_a_matrix_keeps_as_many_digits_of_published_cases(case, name, order):
+    published = case(name)
+    groups = grouped(published["data"])
+    matrix = np.array(list(groups.values())).T
+    found = one_way_of_matrix(np.asarray(matrix, order=order), list(groups))
+    expected, rtol = published["expected"], published["tolerance"]["rtol"]
+    assert [found.df_between, found.df_within] == expected["df"]
+    for key in set(KEYS) & set(expected):
+        assert getattr(found, KEYS[key]) == pytest.approx(expected[key], rel=rtol), key
+
+
+@given(st.integers(2, 90), st.integers(2, 150), st.floats(-1e6, 1e6), st.sampled_from("CF"), st.integers(0, 2**32))
+@settings(max_examples=40)
+def test_a_matrix_gives_what_its_columns_give(n, k, shift, order, seed):
+    matrix = np.random.default_rng(seed).normal(size=(n, k)) + shift
+    found = one_way_of_matrix(np.asarray(matrix, order=order))
+    expected = one_way({str(number + 1): column for number, column in enumerate(matrix.T)})
+    assert found.to_frame().to_numpy()[:, 1:].astype(float) == pytest.approx(
+        expected.to_frame().to_numpy()[:, 1:].astype(float), rel=1e-8, abs=1e-12, nan_ok=True
+    )
+    assert [group.name for group in found.groups] == [group.name for group in expected.groups]
+    assert [group.sd for group in found.groups] == pytest.approx([group.sd for group in expected.groups], rel=1e-8)
+
+
+def test_rows_unlike_the_first_cost_a_matrix_no_digits():
+    matrix = np.full((160, 3), 0.1)
+    matrix[:10] = 1e6
+    matrix += np.random.default_rng(1).normal(size=matrix.shape)
+    found, expected = one_way_of_matrix(matrix), one_way(dict(zip("123", matrix.T, strict=True)))
+    assert pytest.approx(expected.SSW, rel=1e-14) == found.SSW
+    assert pytest.approx(expected.F, rel=1e-8) == found.F
+
+
+@pytest.mark.parametrize(
+    ("matrix", "error", "message"),
+    [
+        ([[1, 2], [1, math.nan]], DataError, "1 of 4 values are missing or infinite"),
+        ([[1, 2], [1, math.inf]], DataError, "1 of 4 values are missing or infinite"),
+        ([[1, 2], [1, 1e200]], DataError, "exceeds 1e\\+140"),
+        ([1, 2, 3], DataError, "must have values x groups"),
+        ([[1, 2], [1]], DataError, "not all numbers"),
+        (np.empty((0, 3)), InsufficientDataError, "no rows"),
+        (np.empty((3, 0)), InsufficientDataError, "two groups are needed"),
+        (np.ones((3, 1)), InsufficientDataError, "two groups are needed"),
+        (np.ones((1, 3)), InsufficientDataError, "only one value"),
+        (np.full((200, 3), 1e9 + 0.1), InsufficientDataError, "All values are the same"),
+    ],
+)
+def test_matrices_without_an_answer(matrix, error, message):
+    with pytest.raises(error, match=message):
+        one_way_of_matrix(matrix)
+
+
+def test_names_of_columns():
+    found = one_way_of_matrix([[1, 2], [3, 5]], ["I", "II"])
+    assert [group.name for group in found.groups] == ["I", "II"]
+    for names in (["I"], ["I", "I"]):
+        with pytest.raises(DataError, match="2 different names"):
+            one_way_of_matrix([[1, 2], [3, 5]], names)
+    with pytest.raises(DataError, match="same name in writing"):
+        one_way({1: [1, 2], "1": [3, 5]})
+
+
 def test_groups_that_differ_without_any_variance_within():
     found = one_way({"a": [1.0, 1.0], "b": [2.0, 2.0]})
     assert (found.F, found.p, found.eta_squared) == (math.inf, 0.0, 1.0)
+    assert found.summary().endswith("No group varies within itself, so F is infinite.")
+
+
+def test_a_group_of_one_value_is_flagged():
+    found = one_way({"a": [1.0, 2.0], "b": [2.0]})
+    assert found.groups[1].sd is None
+    assert "only one value" in found.flags[0]
 
 
 @pytest.mark.parametrize(
@@ -168,6 +240,8 @@ def test_bad_summaries():
         one_way_from_summary(means, {"a": 1.0, "b": -1.0}, 5)
     with pytest.raises(DataError, match="not positive"):
         one_way_from_summary(means, {"a": 1.0, "b": 1.0}, 0)
+    with pytest.raises(DataError, match="whole number"):
+        one_way_from_summary(means, {"a": 1.0, "b": 1.0}, 2.5)
     with pytest.raises(DataError, match="must be positive"):
         pooled_sd_from_f([1, 2], 20, 0)
     with pytest.raises(InsufficientDataError, match="two different means"):

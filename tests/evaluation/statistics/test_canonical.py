@@ -74,7 +74,7 @@ class TestLinnerud:
         assert linnerud.y_redundancy[0] == pytest.approx(0.2584, abs=5e-5)
 
     def test_the_sentence(self, linnerud):
-        assert linnerud.summary() == "Rc = .80, Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064"
+        assert linnerud.apa() == linnerud.summary() == "Rc = .80, Wilks' Λ = .35, F(9, 34.22) = 2.05, p = .064"
         assert linnerud.overall[3].summary() == "Roy's root = 1.72, F(3, 16) = 9.20, p < .001"
 
     def test_the_frames(self, linnerud):
@@ -210,7 +210,7 @@ class TestDependentColumns:
         assert found.x_weights[[0, 2, 3]] == pytest.approx(plain.x_weights, rel=1e-8)
         assert not found.x_weights[[1, 4]].any()
         assert found.x_structure[1] == pytest.approx(found.x_structure[0])
-        assert found.summary().endswith("(combinations of other columns, left out: again, sum)")
+        assert found.flags == ("Combinations of other columns, left out: again, sum.",)
 
     def test_a_large_common_part_does_not_hide_it(self):
         rng = np.random.default_rng(3)
@@ -267,7 +267,8 @@ class TestFewRows:
         found = canonical_correlation(x[:, :2], np.column_stack([y, x[:, 0] ** 2])[:, :3])
         lawley = found.overall[2]
         assert (lawley.F, lawley.p) == (None, None)
-        assert lawley.summary().endswith("(too few rows for an F)")
+        assert lawley.summary() == f"{lawley.apa()}\nHotelling-Lawley U: too few rows for an F."
+        assert found.flags == lawley.flags
         assert all(math.isfinite(test.F) for test in (found.overall[0], found.overall[1], found.overall[3]))
 
     def test_too_few(self):

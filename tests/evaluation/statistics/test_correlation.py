@@ -37,7 +37,7 @@ def test_acii_2007_table_8(case, dimension):
 
 def test_the_sentence_is_in_apa_style(case):
     found = pearson(*columns(case("mtap2013_table8"), 1))
-    assert found.summary() == "r(12) = .57, 95% CI [.05, .84], p = .034"
+    assert found.apa() == found.summary() == "r(12) = .57, 95% CI [.05, .84], p = .034"
 
 
 def test_the_frame_has_full_digits(case):
@@ -73,10 +73,16 @@ def test_a_large_common_part_costs_no_digits():
     assert pearson(x + 1e12, y - 1e12).r == pytest.approx(pearson(x, y).r, rel=1e-12)
 
 
+def test_a_line_too_steep_for_a_number():
+    with pytest.raises(DataError, match="use other units"):
+        pearson([0, 1e-320, 0, 2e-320], [1, 3, 2, 4])
+
+
 def test_three_pairs_have_no_interval():
     found = pearson([1, 2, 3], [1, 3, 2])
     assert found.ci is None
-    assert found.summary() == "r(1) = .50, p = .667"
+    assert found.apa() == "r(1) = .50, p = .667"
+    assert found.flags == ("Three pairs give no interval for r.",)
     assert math.isnan(found.to_frame()["ci_low"].iloc[0])
 
 
@@ -84,6 +90,13 @@ def test_a_perfect_line():
     found = pearson([1, 2, 3, 4], [-1, -3, -5, -7])
     assert (found.r, found.p, found.slope, found.intercept) == pytest.approx((-1, 0, -2, 1), abs=1e-7)
     assert found.ci == pytest.approx((-1, -1))
+    assert "All pairs lie on one line" in found.summary()
+
+
+def test_values_so_small_that_their_squares_vanish():
+    x, y = [1.0, 2, 3, 5, 4], [2.0, 1, 4, 3, 5]
+    found = pearson(np.multiply(x, 1e-200), np.multiply(y, 1e80))
+    assert found.r == pytest.approx(pearson(x, y).r, rel=1e-14)
 
 
 @pytest.mark.parametrize("x", [[], [1], [1, 2]])

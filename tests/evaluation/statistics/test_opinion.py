@@ -30,12 +30,14 @@ def test_another_confidence():
 def test_one_score_has_a_mean_and_nothing_else():
     found = opinion_score([4])
     assert (found.mean, found.sd, found.ci) == (4.0, None, None)
-    assert found.summary() == "M = 4.00, n = 1"
+    assert found.apa() == "M = 4.00, n = 1"
+    assert found.summary() == "M = 4.00, n = 1\nThere is one score, so there is no standard deviation and no interval."
 
 
 def test_the_same_score_from_all():
     found = opinion_score([4, 4, 4])
     assert (found.sd, found.ci) == (0.0, (4.0, 4.0))
+    assert "no width" in found.flags[0]
 
 
 def test_no_score():
@@ -77,3 +79,43 @@ def test_bad_tables():
         opinion_table(pd.DataFrame({"c": [1], "s": [math.inf]}), score="s", by=["c"])
     with pytest.raises(DataError, match="between 0 and 1"):
         opinion_score([1, 2], confidence=1)
+
+
+@pytest.mark.parametrize(("name", "scores"), [("nist_NumAcc1", None), ("nist_NumAcc3", 1000000.2)])
+def test_certified_means_and_deviations(case, name, scores):
+    published = case(name)
+    base = scores
+    values = published["data"].get("y") or [base] + [base - 0.1, base + 0.1] * 500
+    found = opinion_score(values)
+    expected, tolerance = published["expected"], published["tolerance"]["rtol"]
+    assert (found.mean, found.sd) == pytest.approx((expected["mean"], expected["sd"]), rel=tolerance)
+    table = opinion_table(pd.DataFrame({"s": values, "c": 1}), score="s", by=["c"])
+    assert table.loc[0, ["mean", "sd"]].tolist() == pytest.approx([expected["mean"], expected["sd"]], rel=tolerance)
+
+
+# Zhang et al. (2007), Table 7: test correlations of twelve PEP; the paper prints the averages .38 .84 .66 and .69, but
+# the last is .6825.
+TABLE_7 = [
+    [0.56, 0.88, 0.77, 0.74],
+    [0.52, 0.86, 0.77, 0.77],
+    [0.13, 0.82, 0.43, 0.51],
+    [0.13, 0.64, 0.44, 0.62],
+    [0.63, 0.89, 0.79, 0.8],
+    [0.56, 0.91, 0.77, 0.82],
+    [0.53, 0.84, 0.75, 0.6],
+    [0.51, 0.85, 0.76, 0.62],
+    [0.36, 0.89, 0.65, 0.52],
+    [0.24, 0.93, 0.71, 0.75],
+    [0.06, 0.77, 0.52, 0.78],
+    [0.36, 0.83, 0.57, 0.66],
+]
+
+
+def test_averages_of_acii_2007_table_7():
+    means = [opinion_score(column).mean for column in zip(*TABLE_7, strict=True)]
+    assert means == pytest.approx([0.3825, 0.8425, 0.66083333, 0.6825], rel=1e-7)
+
+
+def test_units_do_not_matter():
+    one, two = opinion_score(SLEEP), opinion_score(1e-170 * np.array(SLEEP))
+    assert two.sd == pytest.approx(1e-170 * one.sd)

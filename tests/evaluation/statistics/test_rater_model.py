@@ -1,6 +1,5 @@
 import json
 import math
-from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from evaluation.errors import DataError, InsufficientDataError
+from evaluation.statistics.bt500 import bt500_rejection
+from evaluation.statistics.leave_one_out import leave_one_out
 from evaluation.statistics.rater_model import (
     LEAST_RATINGS,
     deviations,
@@ -19,8 +20,15 @@ from evaluation.statistics.rater_model import (
 )
 
 CASES = json.loads((Path(__file__).parents[2] / "data" / "p910_cases.json").read_text(encoding="utf-8"))
+# sureal 0.9.0, SubjectMLEModelProjectionSolver: quality_scores_std, observer_bias_std, observer_inconsistency_ci95 of
+# the first video and the first subject.
+SUREAL = {
+    "quality_std": 0.11275373417,
+    "bias_std": 0.06552436706,
+    "inconsistency_ci": [0.50403395111, 0.68982891304],
+}
 seeds = st.integers(0, 2**32)
-FUNCTIONS = (rater_model, range_counts, leave_one_out_correlation, deviations)
+FUNCTIONS = (rater_model, range_counts, bt500_rejection, leave_one_out, leave_one_out_correlation, deviations)
 
 
 def published(name):
@@ -158,115 +166,56 @@ class TestRaterModel:
         assert found.inconsistency == pytest.approx([0, 0, 0], abs=1e-12)
         assert found.quality == pytest.approx([2, 3, 6, 4])
 
+    def test_errors_and_intervals_are_those_of_the_authors_program(self):
+        ratings, _ = published("nflx")
+        found = rater_model(ratings)
+        assert found.quality_se == pytest.approx(np.full(79, SUREAL["quality_std"]), rel=1e-6)
+        assert found.bias_se[0] == pytest.approx(SUREAL["bias_std"], rel=1e-6)
+        assert found.inconsistency_ci[0] == pytest.approx(SUREAL["inconsistency_ci"], rel=1e-6)
+        assert found.inconsistency_se == pytest.approx(found.inconsistency / math.sqrt(158))
+        frame = found.to_frame()
+        assert frame["parameter"].value_counts().to_dict() == {"quality": 79, "bias": 26, "inconsistency": 26}
+        first = frame.iloc[0]
+        assert (first.ci_low, first.ci_high) == pytest.approx(tuple(found.quality_ci[0]))
+        assert found.quality_ci[0, 1] - found.quality[0] == pytest.approx(1.959964 * found.quality_se[0], rel=1e-6)
+        assert found.summary() == (
+            "Bias and inconsistency (ITU-T P.910) of 26 raters of 79 items: bias -0.48 to 0.81, SD = 0.30, "
+            "inconsistency 0.45 to 0.88, M = 0.60, mean SE of a quality 0.113"
+        )
+
+    def test_intervals_of_qualities_cover_the_truth(self):
+        rng = np.random.default_rng(7)
+        quality, spread = rng.uniform(1, 5, (400, 1)), rng.uniform(0.4, 0.9, 60)
+        ratings = quality + rng.normal(0, 0.4, 60) + spread * rng.normal(size=(400, 60))
+        ratings[rng.random(ratings.shape) < 0.3] = np.nan
+        found = rater_model(ratings)
+        # Qualities are known up to the mean bias.
+        low, high = (found.quality_ci - (found.quality - quality[:, 0]).mean()).T
+        assert ((low <= quality[:, 0]) & (quality[:, 0] <= high)).mean() == pytest.approx(0.95, abs=0.03)
+
+    def test_what_is_to_be_known_is_flagged(self):
+        few = simulated(3, items=200, raters=3)
+        assert any("collapsed" in flag for flag in rater_model(few).flags)
+        assert any("not come to rest" in flag for flag in rater_model(simulated(3), steps=1).flags)
+        apart = np.full((50, 6), np.nan)
+        apart[:25, :3], apart[25:, 3:] = simulated(1, items=25, raters=3), simulated(2, items=25, raters=3)
+        apart = np.vstack([np.hstack([apart, np.full((50, 1), np.nan)]), np.full((1, 7), np.nan)])
+        text = rater_model(apart).summary()
+        assert "2 groups" in text
+        assert "1 of 7 raters" in text
+        assert "1 of 51 items" in text
+
+    def test_integers_and_lists_as_well(self):
+        ratings = np.random.default_rng(1).integers(1, 6, (20, 6))
+        for other in (ratings.tolist(), ratings.astype(float), np.asfortranarray(ratings)):
+            assert rater_model(other).quality == pytest.approx(rater_model(ratings).quality, abs=1e-9)
+
     @pytest.mark.parametrize(
         "ratings", [np.ones((2, 5)), np.ones((5, 1)), np.full((4, 4), np.nan), np.where(np.eye(4), 3.0, np.nan)]
     )
     def test_too_little(self, ratings):
         with pytest.raises(InsufficientDataError, match="in common"):
             rater_model(ratings)
-
-
-def bt500_by_loops(ratings):
-    """Counts with exact fractions, one score at a time; ratings are whole numbers, None where missing."""
-    above, below = [0] * len(ratings[0]), [0] * len(ratings[0])
-    for row in ratings:
-        there = [(rater, Fraction(int(score))) for rater, score in enumerate(row) if score is not None]
-        if len(there) < 2:
-            continue
-        mean = sum(score for _, score in there) / len(there)
-        second = sum((score - mean) ** 2 for _, score in there) / len(there)
-        fourth = sum((score - mean) ** 4 for _, score in there) / len(there)
-        if second == 0:
-            continue
-        variance = second * len(there) / (len(there) - 1)
-        factor = 4 if 2 <= fourth / second**2 <= 4 else 20
-        for rater, score in there:
-            if (score - mean) ** 2 >= factor * variance:
-                if score > mean:
-                    above[rater] += 1
-                else:
-                    below[rater] += 1
-    return above, below
-
-
-class TestRangeCounts:
-    @settings(deadline=None)
-    @given(seeds, st.integers(2, 30), st.sampled_from([0.0, 0.2]), st.sampled_from([5, 9, 100]))
-    def test_against_loops(self, seed, raters, missing, scale):
-        rng = np.random.default_rng(seed)
-        ratings = np.round(np.clip(rng.normal(scale / 2, scale / 6, (12, raters)), 1, scale))
-        ratings[rng.random(ratings.shape) < 0.05] = scale
-        ratings[rng.random(ratings.shape) < missing] = np.nan
-        above, below = bt500_by_loops([[None if np.isnan(x) else x for x in row] for row in ratings])
-        found = range_counts(ratings)
-        assert (found.above.tolist(), found.below.tolist()) == (above, below)
-        assert found.presentations.tolist() == (~np.isnan(ratings)).sum(axis=0).tolist()
-
-    def test_by_hand(self):
-        # Mean 3.25, SD 1.035, kurtosis 3.00: the 1 is 2.17 SD below.
-        usual = [4, 3, 4, 3, 4, 3, 4, 1]
-        found = range_counts([usual, [3] * 8])
-        assert found.below.tolist() == [0] * 7 + [1]
-        assert found.above.tolist() == [0] * 8
-        assert found.share[-1] == 0.5
-        assert found.asymmetry[-1] == 1
-        assert math.isnan(found.asymmetry[0])
-
-    def test_a_peak_needs_more(self):
-        # Kurtosis 13.1 asks for the root of 20 (4.47) deviations; the lone 5 among 14 ones is 3.61 away, so it stays.
-        assert range_counts([[1] * 14 + [5]]).above.sum() == 0
-        # Among 29 ones it is 5.29 away.
-        assert range_counts([[1] * 29 + [5]]).above.tolist() == [0] * 29 + [1]
-
-    def test_nothing_rated(self):
-        found = range_counts([[np.nan, 1, 2], [np.nan, 2, 2]])
-        assert math.isnan(found.share[0])
-        assert found.presentations[0] == 0
-
-    @settings(deadline=None)
-    @given(seeds, st.floats(-100, 100), st.floats(0.1, 10))
-    def test_units_do_not_matter(self, seed, shift, scale):
-        ratings = np.random.default_rng(seed).standard_t(4, size=(10, 15))
-        one, two = range_counts(ratings), range_counts(shift + scale * ratings)
-        assert (one.above.tolist(), one.below.tolist()) == (two.above.tolist(), two.below.tolist())
-
-
-class TestLeaveOneOutCorrelation:
-    @settings(deadline=None)
-    @given(seeds, st.integers(2, 6), st.sampled_from([0.0, 0.3]))
-    def test_against_loops(self, seed, raters, missing):
-        ratings = simulated(seed, items=20, raters=raters, missing=missing)
-        found = leave_one_out_correlation(ratings)
-        for rater in range(raters):
-            others = np.delete(ratings, rater, axis=1)
-            rows = ~np.isnan(ratings[:, rater]) & (~np.isnan(others)).any(axis=1)
-            expected = np.corrcoef(ratings[rows, rater], np.nanmean(others[rows], axis=1))[0, 1]
-            assert found[rater] == pytest.approx(expected, abs=1e-9)
-
-    def test_who_does_not_vary_has_none(self):
-        found = leave_one_out_correlation([[1, 3, 2], [2, 3, 3], [3, 3, 1], [4, 3, 5]])
-        assert math.isnan(found[1])
-        assert not np.isnan(found[[0, 2]]).any()
-
-    def test_two_items_are_too_few(self):
-        assert np.isnan(leave_one_out_correlation([[1, 2], [2, 1]])).all()
-
-    def test_perfect(self):
-        assert leave_one_out_correlation([[1, 10], [2, 20], [3, 30]]) == pytest.approx([1, 1])
-
-
-class TestDeviations:
-    @settings(deadline=None)
-    @given(seeds)
-    def test_complete_ratings(self, seed):
-        ratings = simulated(seed)
-        assert deviations(ratings) == pytest.approx(ratings.mean(axis=0) - ratings.mean())
-
-    def test_it_does_not_depend_on_which_items_a_rater_got(self):
-        assert deviations([[1, 1, np.nan], [5, np.nan, 5], [np.nan, 3, 3]]) == pytest.approx([0, 0, 0])
-
-    def test_items_rated_alone_tell_nothing(self):
-        assert np.isnan(deviations([[1, np.nan], [np.nan, 2]])).all()
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -295,6 +244,8 @@ def test_any_table_gives_a_result_or_says_why_not(ratings):
             assert (np.nan_to_num(found.inconsistency) >= 0).all()
             assert (np.isnan(found.bias) == (found.group < 0)).all()
             assert np.isfinite(found.largest_weight)
+            assert (np.isnan(found.quality_se) == np.isnan(found.quality)).all()
+            assert (~np.isnan(found.bias)).all() or found.flags
         elif function is leave_one_out_correlation:
             assert (np.abs(np.nan_to_num(found)) <= 1).all()
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.instruments.emotion14 import EMOTION14
-from evaluation.statistics.votes import votes
+from evaluation.statistics.votes import votes, votes_of_counts
 
 WORDS = {option.value: option.label["en"] for option in EMOTION14.items[0].options}
 
@@ -57,3 +57,28 @@ def test_bad_votes():
         votes(WORDS, [float("nan")])
     with pytest.raises(DataError, match="same name"):
         votes({1: "Happy", 2: "Happy"}, [1])
+
+
+# Jia et al. (2013), Tables 1 and 4: sentences by prosodic words, and by emotion.
+@pytest.mark.parametrize(
+    ("counts", "percent"),
+    [([8, 50, 7, 17, 12], [8.5, 53.2, 7.4, 18.1, 12.8]), ([15, 26, 22, 31], [16.0, 27.7, 23.4, 33.0])],
+)
+def test_counts_of_the_paper(counts, percent):
+    found = votes_of_counts([f"c{k}" for k in range(len(counts))], counts)
+    assert found.n == 94
+    assert [100 * share for share in found.shares] == pytest.approx(percent, abs=0.0501)
+    assert found.apa() == found.summary()
+
+
+def test_bad_counts():
+    with pytest.raises(DataError, match="2 categories, but 1 counts"):
+        votes_of_counts(["a", "b"], [1])
+    with pytest.raises(DataError, match="whole number"):
+        votes_of_counts(["a", "b"], [1, -1])
+    with pytest.raises(DataError, match="whole number"):
+        votes_of_counts(["a", "b"], [1, float("nan")])
+    with pytest.raises(DataError, match="same name"):
+        votes_of_counts(["a", "a"], [1, 1])
+    with pytest.raises(InsufficientDataError, match="no votes"):
+        votes_of_counts(["a", "b"], [0, 0])

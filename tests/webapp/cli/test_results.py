@@ -1,5 +1,6 @@
 """`padlab report` and `padlab export` of studies with parts."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -48,8 +49,33 @@ def test_an_export_is_one_file_for_each_table(run: object, rich: None, tmp_path:
     assert run("export", "rich", "--out", str(tmp_path / "out")).exit_code == 0
     files = {path.stem: pd.read_csv(path) for path in (tmp_path / "out").iterdir()}
     assert set(files) == {
-        *("responses", "scores", "trials", "participants", "playback"),
+        *("responses", "items", "scores", "trials", "participants", "playback"),
         *("annotation", "rounds", "screening", "audit", "codebook"),
     }
     assert files["participants"]["participant"].tolist() == [1, 2, 3]
     assert set(files["responses"]["part"]) == {"faces", "pairs", "words"}
+
+
+def test_an_export_in_several_formats(run: object, rich: None, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    written = run("export", "rich", "--out", str(out), "--format", "parquet, sav,XLSX,json,sav")
+    assert written.exit_code == 0, written.output
+    assert {path.suffix for path in out.iterdir()} == {".parquet", ".sav", ".xlsx", ".json"}
+    assert written.output.splitlines() == [
+        f"Written: {out / line.split('/')[-1]}" for line in written.output.split()[1::2]
+    ]
+    answers = pd.read_parquet(out / "responses.parquet")
+    assert answers["participant"].dtype == "Int64"
+    assert len(json.loads(run("export", "rich", "--format", "json").output)) == len(answers)
+
+
+def test_formats_that_are_none_are_told(run: object, tmp_path: Path) -> None:
+    for given in ("csv,stata", "stata", ""):
+        refused = run("export", "rich", "--out", str(tmp_path / "out"), "--format", given)
+        assert refused.exit_code == 2
+        assert "is no format; it takes csv, parquet, sav, xlsx, json" in refused.stderr
+    for given in ("csv,json", "xlsx"):
+        refused = run("export", "rich", "--format", given)
+        assert refused.exit_code == 2
+        assert "give --out DIR" in refused.stderr
+    assert not (tmp_path / "out").exists()

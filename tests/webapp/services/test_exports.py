@@ -1,22 +1,32 @@
 """The tables of an export: what is in them, what a study does not share, and the codebook."""
 
 import io
+import json
 from collections.abc import Callable
 from pathlib import Path
 
+import openpyxl
 import pandas as pd
+import pyarrow.parquet as pq
+import pyreadstat
 import pytest
 from sqlalchemy import select
 
+from evaluation.errors import DataError
+from evaluation.report import table_files
 from evaluation.study import StudySpec
 from webapp.config import Settings
 from webapp.db import Database
+from webapp.errors import ConfigError
 from webapp.models import Participant, PlaybackEvent, StudyState
 from webapp.services import enrolment, exports, results, studies, trials
 from webapp.services.enrolment import Panel
 
 RICH = (Path(__file__).parents[2] / "data" / "rich.yaml").read_text(encoding="utf-8")
-TABLES = ["responses", "scores", "trials", "participants", "playback", "annotation", "rounds", "screening", "audit"]
+TABLES = [
+    *("responses", "items", "scores", "trials", "participants"),
+    *("playback", "annotation", "rounds", "screening", "audit"),
+]
 
 
 @pytest.fixture
@@ -98,6 +108,8 @@ def test_a_study_shares_only_what_it_says(database: Database, collected: Callabl
     assert {"panel", "panel_id"} <= set(tables["participants"])
     assert not {"why", "comment"} & set(tables["responses"]["item"])
     assert "seen" in set(tables["responses"]["item"])
+    assert not {"extra.why", "discussion.comment"} & set(tables["items"])
+    assert "extra.seen" in tables["items"]
     book = set(tables["codebook"]["variable"])
     assert not {"trials.shown_at", "playback.kind"} & book
 
@@ -145,3 +157,78 @@ def test_csv_keeps_whole_numbers_and_gaps(database: Database, collected: Callabl
     assert not again["clip"].str.contains(".", regex=False).any()
     assert set(again["round"]) == {"", "1"}
     assert set(again["flipped"]) == {"True", "False"}
+
+
+def test_items_have_a_row_for_each_clip_and_a_column_for_each_item(
+    database: Database, collected: Callable[..., StudySpec]
+) -> None:
+    collected()
+    tables = read(database)
+    items, answers = tables["items"], tables["responses"]
+    place = ["participant", "trial", "clip", "word"]
+    assert not items.duplicated(place).any()
+    long = items.melt(id_vars=list(exports.ITEM_COLUMNS), var_name="name", value_name="keyed").dropna(subset="keyed")
+    given = answers.assign(name=answers["instrument"] + "." + answers["item"])
+    columns = [*exports.ITEM_COLUMNS, "name", "keyed"]
+    assert tuples(long[columns]) == tuples(given[columns])
+    assert items["pad12.Q1"].dtype == "Int64"
+    assert set(items.loc[items["part"] == "words", "word"].dropna()) == {1, 2}
+
+
+def tuples(frame: pd.DataFrame) -> list[tuple[str, ...]]:
+    return sorted(tuple(map(str, row)) for row in frame.itertuples(index=False))
+
+
+@pytest.mark.every_database
+def test_every_format_holds_every_table(
+    database: Database, collected: Callable[..., StudySpec], tmp_path: Path
+) -> None:
+    collected()
+    tables = read(database)
+    with database.read() as session:
+        labels = exports.value_labels(session, "rich")
+    folder = tmp_path / "new" / "out"
+    paths = exports.write(tables, folder, exports.FORMATS, labels=labels)
+    assert sorted(paths) == sorted(folder.iterdir())
+    assert len(paths) == 4 * len(tables) + 1
+    sheets = openpyxl.load_workbook(folder / table_files.WORKBOOK, read_only=True)
+    assert sheets.sheetnames == list(tables)
+    for name, table in tables.items():
+        assert pd.read_csv(folder / f"{name}.csv").shape == table.shape
+        assert pq.read_table(folder / f"{name}.parquet").shape == table.shape
+        assert pyreadstat.read_sav(folder / f"{name}.sav")[0].shape == table.shape
+        assert len(json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))) == len(table)
+        assert len(list(sheets[name].iter_rows())) == len(table) + 1
+    frame, meta = pyreadstat.read_sav(folder / "items.sav")
+    assert meta.variable_value_labels["extra.clear"] == {1.0: "no", 2.0: "rather", 3.0: "yes"}
+    assert meta.variable_value_labels["about.tired"] == {0.0: "no", 100.0: "very"}
+    assert meta.column_names_to_labels["extra.clear"] == "Clear?"
+    assert frame["extra.clear"].dropna().isin([1, 2, 3]).all()
+    kinds = {field.name: field for field in pq.read_schema(folder / "trials.parquet")}
+    assert str(kinds["shown_at"].type) == "timestamp[us, tz=UTC]"
+    assert kinds["shown_at"].metadata[b"description"].startswith(b"when the trial was first")
+    first = {path.name: path.read_bytes() for path in paths}
+    exports.write(read(database), folder, exports.FORMATS, labels=labels)
+    assert {path.name: path.read_bytes() for path in paths} == first
+
+
+def test_a_study_without_answers_has_the_types_of_one_with(database: Database, mini: str, tmp_path: Path) -> None:
+    tables = read(database, mini)
+    exports.write(tables, tmp_path, ["parquet"])
+    playback = {field.name: str(field.type) for field in pq.read_schema(tmp_path / "playback.parquet")}
+    assert playback["page_ms"] == "int64"
+    assert playback["media_s"] == playback["value"] == "double"
+    trials = {field.name: str(field.type) for field in pq.read_schema(tmp_path / "trials.parquet")}
+    assert trials["answered_at"] == "timestamp[us, tz=UTC]"
+    assert trials["clip"].endswith("string")
+
+
+def test_nothing_is_left_half_written(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("earlier")
+    tables = {"a": pd.DataFrame({"x": [1.0]}), "b": pd.DataFrame({"x": [float("inf")]})}
+    with pytest.raises(DataError, match="column x of the table b"):
+        exports.write(tables, tmp_path, ["csv", "json"])
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert (tmp_path / "a.csv").read_text() == "earlier"
+    with pytest.raises(ConfigError, match=r"a.csv/in cannot be written .* name another folder with --out"):
+        exports.write(tables, tmp_path / "a.csv" / "in", ["csv"])
