@@ -25,7 +25,8 @@ test: setup ## all tests, on SQLite and PostgreSQL, with a real browser; two fil
 	@$(BIN)/python -m pytest -n 2 --dist loadfile
 
 soak: setup ## slower proofs: more of the random tests, and whole studies over HTTP (many minutes)
-	@PADLAB_SOAK=1 $(BIN)/python -m pytest tests/soak tests/webapp/services/test_engine_machine.py -s
+	@PADLAB_SOAK=1 $(BIN)/python -m pytest tests/soak tests/webapp/services/test_engine_machine.py \
+	  tests/evaluation/statistics/test_bad_data.py -s
 
 lint: setup ## style, types and the direction of imports
 	@$(BIN)/ruff check .

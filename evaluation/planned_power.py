@@ -345,9 +345,11 @@ def correlation_plan(
 def told_design(plan: Plan) -> str:
     """Return what a plan means, as a sentence."""
     design = plan.design
+    # With fewer trials for each, several people make up a rater who sees everything.
+    counted = f"as much as {design.raters} raters of whom " if design.raters != plan.raters else ""
     return (
         f"{plan.raters} raters x {design.items} stimuli x {design.conditions} conditions "
-        f"({', '.join(plan.conditions)}): {SEEING[design.assignment]}, {design.ratings} ratings, "
+        f"({', '.join(plan.conditions)}): {counted}{SEEING[design.assignment]}, {design.ratings} ratings, "
         f"{design.raters_per_clip} of each clip."
     )
 

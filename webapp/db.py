@@ -50,11 +50,14 @@ class Database:
         self.engine = _engine(url)
         # The option travels with the connection to the "begin" event below.
         self._writing = self.engine.execution_options(padlab_write=True)
+        # A report asks several questions, and all answers are to be of one moment; so they are on SQLite anyway.
+        one_moment = {} if self.engine.dialect.name == "sqlite" else {"isolation_level": "REPEATABLE READ"}
+        self._reading = self.engine.execution_options(**one_moment)
 
     @contextmanager
     def read(self) -> Iterator[Session]:
         """Open a session for reading; nothing is committed."""
-        with _one_sentence(self.url), Session(self.engine, autoflush=False) as session:
+        with _one_sentence(self.url), Session(self._reading, autoflush=False) as session:
             yield session
 
     @contextmanager

@@ -69,9 +69,13 @@ def results_section(
     return Section(name, title, ("Analysis", "Unit", "Result"), 3, rows, tuple(dict.fromkeys([*notes, *flags])))
 
 
-def stacked(frames: Mapping[str, Result | Unavailable], column: str) -> pd.DataFrame:
+def stacked(
+    results: Mapping[str, Result | Unavailable],
+    column: str,
+    frame_of: Callable[[Result], pd.DataFrame] = lambda found: found.to_frame(),
+) -> pd.DataFrame:
     """Return the frames of several results one under the other, with a first column that tells them apart."""
-    found = {name: result.to_frame() for name, result in frames.items() if isinstance(result, Result)}
+    found = {name: frame_of(result) for name, result in results.items() if isinstance(result, Result)}
     if not found:
         return pd.DataFrame(columns=[column])
     table = pd.concat([frame.assign(**{column: name}) for name, frame in found.items()], ignore_index=True)

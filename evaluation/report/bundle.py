@@ -41,7 +41,7 @@ def files(full: FullReport, *, prefix: str = "") -> Iterator[tuple[str, bytes]]:
 def study_files(reports: Mapping[str, FullReport]) -> Iterator[tuple[str, bytes]]:
     """Yield all files of the reports on the parts of a study, by the parts' names, and the page on the papers."""
     for name, full in reports.items():
-        yield from files(full, prefix="" if len(reports) == 1 else name)
+        yield from files(full, prefix="" if full.report.study.parts is None else name)
     yield papers_page()
 
 

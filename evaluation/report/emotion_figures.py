@@ -33,6 +33,8 @@ from evaluation.statistics.matrices import finite_array
 _COLOURS = (*COLOURS, "#444444")
 _SHAPES = (*SHAPES, "X", "*")
 _LONGEST_NAME = 40
+# Fillings of more categories lie over each other.
+_MOST_FILLED = 8
 _PANELS = (("P", "A"), ("P", "D"), ("A", "D"))
 
 
@@ -83,7 +85,8 @@ def pad_by_category(pad: npt.ArrayLike, categories: Sequence[str], *, coverage: 
         _prepare_panel(axes, across, up, limit)
         places = [DIMENSIONS.index(across), DIMENSIONS.index(up)]
         means = [
-            _draw_category(axes, points[:, places], place, coverage) for place, points in enumerate(members.values())
+            _draw_category(axes, points[:, places], place, coverage, filled=len(members) <= _MOST_FILLED)
+            for place, points in enumerate(members.values())
         ]
     figure.legend(
         means,
@@ -131,7 +134,7 @@ def _prepare_panel(axes: Axes, across: str, up: str, limit: float) -> None:
     axes.set_ylabel(f"{NAMES_OF_DIMENSIONS[up]} ({up})", color=INK)
 
 
-def _draw_category(axes: Axes, points: FloatArray, place: int, coverage: float) -> Line2D:
+def _draw_category(axes: Axes, points: FloatArray, place: int, coverage: float, *, filled: bool) -> Line2D:
     colour, shape = _COLOURS[place % len(_COLOURS)], _SHAPES[place % len(_SHAPES)]
     xs, ys = points.T
     axes.plot(xs, ys, linestyle="", marker=shape, markersize=4, color=colour, alpha=0.45, markeredgewidth=0, zorder=2)
@@ -140,7 +143,8 @@ def _draw_category(axes: Axes, points: FloatArray, place: int, coverage: float) 
     except InsufficientDataError:
         outline = None
     if outline is not None:
-        axes.fill(*outline.T, facecolor=colour, alpha=0.08, linewidth=0, zorder=3)
+        if filled:
+            axes.fill(*outline.T, facecolor=colour, alpha=0.08, linewidth=0, zorder=3)
         axes.plot(*outline.T, color=colour, linewidth=1.6, zorder=4)
     (mean,) = axes.plot(
         [float(xs.mean())],

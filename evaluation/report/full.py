@@ -11,13 +11,15 @@ from evaluation.report import tables
 from evaluation.report.analysis import StudyReport
 from evaluation.report.block import Block, Maker
 from evaluation.report.comparison import comparison
-from evaluation.report.design import design, methods
+from evaluation.report.design import design
+from evaluation.report.methods import methods
 from evaluation.report.pad_results import intended_words, pad_results
 from evaluation.report.precision import precision
 from evaluation.report.rater_agreement import rater_agreement, rater_consistencies
 from evaluation.report.rater_quality import rater_quality
 from evaluation.report.scale_quality import scale_quality
 from evaluation.report.section import Section
+from evaluation.statistics.wording import counted
 
 MAKERS: Mapping[str, Maker] = MappingProxyType(
     {
@@ -80,12 +82,18 @@ class FullReport:
     @property
     def headline(self) -> list[str]:
         """The main results as sentences."""
-        return [*tables.headline(self.report), *(one for block in self.blocks.values() for one in block.sentences)]
+        return [*(one for block in self.blocks.values() for one in block.sentences), *tables.headline(self.report)]
+
+    @property
+    def further(self) -> tuple[str, ...]:
+        """Names of the frames that no table on the page is made of."""
+        shown = {section.frame for section in self.sections}
+        return tuple(name for name in self.frames if name not in shown)
 
     @property
     def methods(self) -> str:
         """A paragraph on methods for a paper."""
-        return methods(self.report, tuple(self.blocks))
+        return methods(self.report, self.blocks)
 
 
 def _of_used(block: Block, raters: int) -> Block:
@@ -93,10 +101,10 @@ def _of_used(block: Block, raters: int) -> Block:
     sections = tuple(
         one._replace(
             name=f"{one.name}_used",
-            title=f"{one.title} – the {raters} raters used",
+            title=f"{one.title} – the {counted(raters, 'rater')} used",
             source=f"{one.source}_used" if one.source else "",
         )
         for one in block.sections
     )
     frames = {f"{name}_used": frame for name, frame in block.frames.items()}
-    return Block(sections, frames, tuple(f"With the {raters} raters used: {one}" for one in block.sentences))
+    return Block(sections, frames, tuple(f"With the {counted(raters, 'rater')} used: {one}" for one in block.sentences))

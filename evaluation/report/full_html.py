@@ -6,6 +6,9 @@ from evaluation.report import figures, tables
 from evaluation.report.full import FullReport
 from evaluation.report.html import page
 
+FOLD_ABOVE = 20
+"""Rows of a table above which the page shows it folded."""
+
 
 def render(full: FullReport, *, folder: str = "tables/", linked: bool = True) -> str:
     """Return the full report as the text of an HTML file, the same for the same report.
@@ -37,4 +40,6 @@ def render(full: FullReport, *, folder: str = "tables/", linked: bool = True) ->
         methods=full.methods,
         folder=folder,
         linked=linked,
+        further=full.further,
+        fold_above=FOLD_ABOVE,
     )

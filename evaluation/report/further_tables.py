@@ -55,6 +55,8 @@ def further_frames(report: StudyReport) -> dict[str, pd.DataFrame]:
         found["votes"] = pd.concat(parts, ignore_index=True)[columns]
     if isinstance(report.preferences, BradleyTerry):
         found["preferences"] = report.preferences.to_frame().rename(columns={"name": "condition"})
+    elif report.preferences is not None:
+        found["preferences"] = pd.DataFrame(columns=["condition"])
     if report.repeats:
         found["repeats"] = pd.DataFrame(
             {

@@ -21,6 +21,7 @@ _SIGNS = MappingProxyType(
         ">": r"\textgreater{}",
         "–": "--",
         "−": "$-$",
+        "′": r"$'$",
         "±": r"$\pm$",
         "×": r"$\times$",
         "²": r"\textsuperscript{2}",
@@ -44,6 +45,9 @@ _SIGNS = MappingProxyType(
     }
 )
 
+LONG = 40
+"""Letters in a cell of text above which its column has a width of its own."""
+
 
 def table(section: Section) -> str:
     """Return a section as a LaTeX table with caption and label; it needs the package booktabs.
@@ -58,13 +62,12 @@ def table(section: Section) -> str:
     str
         A ``table`` environment, ending with a line break; the section's notes stand under the table.
     """
-    numbers = len(section.header) - section.text_columns
     lines = [
         r"\begin{table}",
         r"\centering",
         rf"\caption{{{escaped(section.title)}}}",
         rf"\label{{tab:{section.name.replace('_', '-')}}}",
-        rf"\begin{{tabular}}{{{'l' * section.text_columns}{'r' * numbers}}}",
+        rf"\begin{{tabular}}{{{_columns(section)}}}",
         r"\toprule",
         _row(section.header),
         r"\midrule",
@@ -82,5 +85,16 @@ def escaped(text: str) -> str:
     return "".join(_SIGNS.get(sign, sign) for sign in text)
 
 
+def _columns(section: Section) -> str:
+    """Return the kinds of the columns: long texts are broken into lines of a share of the page."""
+    texts = range(section.text_columns)
+    long = [max((len(row[place]) for row in section.rows), default=0) > LONG for place in texts]
+    share = 0.9 / max(section.text_columns, 2)
+    kinds = [rf"p{{{share:.2f}\linewidth}}" if is_long else "l" for is_long in long]
+    return "".join([*kinds, "r" * (len(section.header) - section.text_columns)])
+
+
 def _row(cells: tuple[str, ...]) -> str:
-    return " & ".join(map(escaped, cells)) + r" \\"
+    # An empty group, since a bracket or a star at the beginning would belong to the end of the row before.
+    guard = "{}" if cells[0][:1] in {"[", "*"} and cells[0] else ""
+    return guard + " & ".join(map(escaped, cells)) + r" \\"

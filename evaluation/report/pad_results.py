@@ -14,7 +14,7 @@ from evaluation.statistics import wording
 from evaluation.statistics.confusion import Confusion, confusion
 from evaluation.statistics.ellipse import Ellipse, ellipse
 from evaluation.statistics.emotion_words import NearestWords, nearest_words
-from evaluation.statistics.pad_space import DimensionComparison, PadComparison, compare_pad
+from evaluation.statistics.pad_space import DimensionComparison, compare_pad
 from evaluation.statistics.result import Result
 
 COVERAGES = (0.5, 0.95)
@@ -50,7 +50,8 @@ def _errors(report: StudyReport) -> tuple[Section, pd.DataFrame] | None:
         *(flag for one in found.dimensions for flag in one.flags),
     )
     rows = tuple(_error(one) for one in found.dimensions)
-    return Section("pad_error", title, header, 1, rows, tuple(dict.fromkeys(notes))), _error_frame(found)
+    frame = found.to_frame().assign(mean_distance=found.mean_distance, common_slope=found.common_slope)
+    return Section("pad_error", title, header, 1, rows, tuple(dict.fromkeys(notes))), frame
 
 
 def _error(found: DimensionComparison) -> tuple[str, ...]:
@@ -67,10 +68,6 @@ def _error(found: DimensionComparison) -> tuple[str, ...]:
         NOTHING if slope_ci is None else f"{wording.number(slope_ci[0])} to {wording.number(slope_ci[1])}",
         NOTHING if line is None else wording.number(line.intercept),
     )
-
-
-def _error_frame(found: PadComparison) -> pd.DataFrame:
-    return found.to_frame()
 
 
 def _nearest(report: StudyReport) -> tuple[Section, pd.DataFrame]:
@@ -91,7 +88,10 @@ def _nearest(report: StudyReport) -> tuple[Section, pd.DataFrame]:
             "distance": found.distance,
         }
     )
-    note = "The word of Jia et al. (2013), Table 8, whose PAD is nearest to the evaluated PAD (Euclidean distance)."
+    note = (
+        "The word of Jia et al. (2013), Table 8, whose input PAD is nearest to the evaluated PAD (Euclidean distance). "
+        "Raters keep away from the ends of the scale, which draws all faces towards words near the middle."
+    )
     return Section("nearest_words", title, header, 2, rows, (note, *found.flags)), frame
 
 
@@ -117,7 +117,10 @@ def _ellipses(report: StudyReport) -> tuple[Section, pd.DataFrame]:
                 )
             )
     header = ("Stimulus", "Coverage", *DIMENSIONS, "Half axes", "Ratings inside")
-    note = "Ellipsoids that hold half and 95 % of a normal distribution with the mean and covariance of the ratings."
+    note = (
+        "Ellipsoids that hold half and 95 % of a normal distribution with the mean and covariance of the ratings of "
+        "all conditions together."
+    )
     section = Section(
         "pad_ellipsoids", "Ellipsoids of the ratings", header, 2, tuple(rows), tuple(dict.fromkeys([note, *notes]))
     )

@@ -5,7 +5,7 @@ from functools import partial
 import pandas as pd
 
 from evaluation.report.analysis import StudyReport
-from evaluation.report.block import Block, attempt
+from evaluation.report.block import Block, attempt, stacked
 from evaluation.report.ratings import Unavailable
 from evaluation.report.score_table import ScoreTable, score_tables
 from evaluation.report.section import NOTHING, Section, label
@@ -15,21 +15,31 @@ from evaluation.statistics.bounded_interval import BoundedTable, Method, bounded
 from evaluation.statistics.opinion import opinion_table
 from evaluation.statistics.result import Result
 from evaluation.statistics.sos import sos_from_summary
-from evaluation.statistics.votes_needed import VotesNeeded, votes_needed_from_summary
+from evaluation.statistics.votes_needed import votes_needed_from_summary
 
 BOOTSTRAP_RATINGS = 50_000
 """Ratings of a condition up to which its mean is resampled; with more, the intervals hardly differ."""
 
 _INTERVALS = (
-    "Three intervals of 95 % for the same mean. Student's does not know the ends of the scale; the binomial one takes "
-    "the mean as a share of the scale, which cannot leave it and is cautious (Hoßfeld et al., 2018); the bootstrap "
-    "resamples ratings (BCa). All three take ratings as independent, although each participant gives several."
+    "Intervals of 95 % for the same mean. Student's does not know the ends of the scale; the binomial one takes the "
+    "mean as a share of the scale, which cannot leave it, and is cautious unless ratings go to both ends (Hoßfeld et "
+    "al., 2018); the bootstrap resamples ratings (BCa) if there are not too many. They take ratings as independent, "
+    "although each participant gives several; those of the mixed model do not."
+)
+
+VOTES = (
+    "Ratings of each clip until the 95 % interval of its mean reaches {:g} to either side at most (analysis.half_width "
+    "in the study file)."
+)
+SOS = (
+    "The parameter a of the SOS hypothesis (Hoßfeld et al., 2011), by which the variance of the ratings of a clip "
+    "follows its mean."
 )
 
 
 def precision(report: StudyReport) -> Block | None:
     """Return intervals, votes still needed and the SOS parameter of the opinion scores; None if there are none."""
-    found = [one for one in score_tables(report) if one.score == "MOS"]
+    found = [one for one in score_tables(report) if one.opinion]
     if not found:
         return None
     table = found[0]
@@ -52,24 +62,24 @@ def precision(report: StudyReport) -> Block | None:
             several["mean"].to_numpy(), several["sd"].to_numpy() ** 2, low=table.scale[0], high=table.scale[1], rng=rng
         )
     )
-    lines = (("Votes needed", _said(needed)), ("SOS hypothesis", _said(spread_found)))
-    notes = (
-        f"Votes needed: ratings of each clip until the 95 % interval of its mean reaches {half_width:g} to either side "
-        "at most (analysis.half_width in the study file). SOS: the parameter a of Hoßfeld et al. (2011), by which "
-        "the variance of the ratings of a clip follows its mean.",
-        *(flag for one in (needed, spread_found) if isinstance(one, Result) for flag in one.flags),
+    return Block(
+        (
+            intervals,
+            _one("votes_needed", "Votes still needed", needed, VOTES.format(half_width)),
+            _one("precision", "Spread of the ratings against their mean", spread_found, SOS, source="sos"),
+        ),
+        {
+            "mos_intervals": interval_frame,
+            "votes_needed": stacked({"MOS": needed}, "score"),
+            "sos": stacked({"MOS": spread_found}, "score"),
+        },
     )
-    section = Section("precision", "Precision of the opinion scores", ("", "Result"), 2, lines, notes, "votes_needed")
-    frames = {
-        "mos_intervals": interval_frame,
-        "votes_needed": needed.to_frame() if isinstance(needed, VotesNeeded) else pd.DataFrame(columns=["name"]),
-        "sos": spread_found.to_frame() if isinstance(spread_found, Result) else pd.DataFrame(columns=["a"]),
-    }
-    return Block((intervals, section), frames)
 
 
-def _said(found: Result | Unavailable) -> str:
-    return found.reason if isinstance(found, Unavailable) else found.apa()
+def _one(name: str, title: str, found: Result | Unavailable, note: str, *, source: str = "") -> Section:
+    flags = found.flags if isinstance(found, Result) else ()
+    said = found.reason if isinstance(found, Unavailable) else found.apa()
+    return Section(name, title, ("Result",), 1, ((said,),), (note, *flags), source)
 
 
 def _intervals(report: StudyReport, table: ScoreTable) -> tuple[Section, pd.DataFrame]:
@@ -77,6 +87,7 @@ def _intervals(report: StudyReport, table: ScoreTable) -> tuple[Section, pd.Data
     frame = opinion_table(table.table, score="value", by=["condition"])
     frame = frame.rename(columns={"ci_low": "t_low", "ci_high": "t_high"})
     largest = int(table.table["condition"].value_counts().max())
+    notes = [_INTERVALS]
     methods: tuple[Method, ...] = ("binomial", "bootstrap") if largest <= BOOTSTRAP_RATINGS else ("binomial",)
     for method in methods:
         rng = generator(report.study.seed, "report", "mos intervals") if method == "bootstrap" else None
@@ -86,6 +97,7 @@ def _intervals(report: StudyReport, table: ScoreTable) -> tuple[Section, pd.Data
             )
         )
         if isinstance(found, BoundedTable):
+            notes += found.flags
             own = found.to_frame().set_index("condition")
             for end in ("low", "high"):
                 frame[f"{method}_{end}"] = frame["condition"].map(own[f"ci_{end}"])
@@ -102,7 +114,7 @@ def _intervals(report: StudyReport, table: ScoreTable) -> tuple[Section, pd.Data
         for line in frame.to_dict("records")
     )
     header = ("Condition", "Ratings", "MOS", "Student", "Binomial", "Bootstrap")
-    return Section("mos_intervals", "Intervals of the opinion scores", header, 1, rows, (_INTERVALS,)), frame
+    return Section("mos_intervals", "Intervals of the opinion scores", header, 1, rows, tuple(notes)), frame
 
 
 def _interval(low: float | None, high: float | None) -> str:

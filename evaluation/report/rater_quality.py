@@ -1,6 +1,6 @@
 """What single raters are like: bias and inconsistency, scores out of range, agreement with the others."""
 
-from collections.abc import Hashable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,14 +12,27 @@ from evaluation.report.ratings import Unavailable
 from evaluation.report.score_table import ScoreTable, score_tables
 from evaluation.report.section import NOTHING, Section
 from evaluation.statistics import wording
-from evaluation.statistics.bt500 import bt500_rejection
+from evaluation.statistics.bt500 import Bt500Rejection, bt500_rejection
 from evaluation.statistics.leave_one_out import leave_one_out
-from evaluation.statistics.rater_model import rater_model
+from evaluation.statistics.rater_model import RaterModel, rater_model
 
 MOST_RATERS = 60
 """Raters up to whom the table for reading has a line for each; the file always has."""
+_COLUMNS = MappingProxyType(
+    {
+        "rater": "Rater",
+        "ratings": "Ratings",
+        "bias": "Bias",
+        "inconsistency": "Inconsistency",
+        "r_others": "r, others",
+        "bt500_rejected": "BT.500",
+    }
+)
+"""Columns of the frame that the page shows, with their heads."""
+
 _SOURCES = (
     "Bias and inconsistency: the model of Recommendation ITU-T P.910 (Li et al., 2020), in the units of the score. "
+    "Their intervals take the qualities of the clips as known, and are too short with few raters or clips. "
     "r, others: Pearson's r of a rater with the mean of all others. BT.500: whether Recommendation ITU-R BT.500-14 "
     "would reject the rater. These figures describe; nobody is left out because of them unless the study file says so."
 )
@@ -35,10 +48,14 @@ def rater_quality(report: StudyReport) -> Block | None:
         frame, remarks = _described(table)
         name = f"raters_{table.slug}"
         frames[name] = frame
-        rows = tuple(_row(line) for line in frame.head(MOST_RATERS).to_dict("records"))
+        shown = [column for column in _COLUMNS if column in frame]
+        rows = tuple(
+            tuple(_written(column, line[column]) for column in shown)
+            for line in frame.head(MOST_RATERS).to_dict("records")
+        )
         if len(frame) > MOST_RATERS:
             remarks = (f"The first {MOST_RATERS} of {len(frame)} raters; all are in the file.", *remarks)
-        header = ("Rater", "Ratings", "Bias", "Inconsistency", "r, others", "BT.500")
+        header = tuple(_COLUMNS[column] for column in shown)
         sections.append(Section(name, f"{table.score}: raters", header, 1, rows, (_SOURCES, *remarks)))
     return Block(tuple(sections), frames)
 
@@ -68,21 +85,18 @@ def _described(table: ScoreTable) -> tuple[pd.DataFrame, tuple[str, ...]]:
     for found in (model, others, rejection):
         if isinstance(found, Unavailable):
             remarks.append(found.reason)
-        else:
-            remarks += [*([] if found is model and model.collapsed else [found.apa()]), *found.flags]
+            continue
+        collapsed = isinstance(found, RaterModel) and found.collapsed
+        # BT.500 knows raters by their place, readers by their number.
+        remarks += [*([] if collapsed or isinstance(found, Bt500Rejection) else [found.apa()]), *found.flags]
     return pd.DataFrame(columns), tuple(dict.fromkeys(remarks))
 
 
-def _row(line: Mapping[Hashable, Any]) -> tuple[str, ...]:
-    return (
-        str(line["rater"]),
-        str(line["ratings"]),
-        _number(line.get("bias")),
-        _number(line.get("inconsistency")),
-        NOTHING if pd.isna(line.get("r_others")) else wording.share(line["r_others"]),
-        NOTHING if "bt500_rejected" not in line else "rejects" if line["bt500_rejected"] else "keeps",
-    )
-
-
-def _number(value: Any) -> str:
-    return NOTHING if pd.isna(value) else wording.number(value)
+def _written(column: str, value: Any) -> str:
+    if column in {"rater", "ratings"}:
+        return str(value)
+    if column == "bt500_rejected":
+        return "rejects" if value else "keeps"
+    if pd.isna(value):
+        return NOTHING
+    return wording.share(value) if column == "r_others" else wording.number(value)

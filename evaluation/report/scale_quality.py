@@ -1,5 +1,8 @@
 """How good the 12-item questionnaire for pleasure, arousal and dominance is as a scale, in a study's answers."""
 
+import math
+
+import numpy as np
 import pandas as pd
 
 from evaluation.instruments.pad12 import PAD12
@@ -11,6 +14,10 @@ from evaluation.responses import KEY
 from evaluation.seeding import generator
 from evaluation.statistics import wording
 from evaluation.statistics.pad_scale_quality import DimensionQuality, pad_scale_quality
+
+REPLICATES, FEWER_REPLICATES = 1_000, 200
+MANY_ROWS = 5_000
+"""Rows above which intervals of omega come from fewer bootstrap samples: they are narrow then, and samples are slow."""
 
 _SOURCES = (
     "Alpha: Cronbach's, with Feldt's interval. Omega: McDonald's total of a one-factor model by maximum likelihood, "
@@ -24,14 +31,14 @@ def scale_quality(report: StudyReport) -> Block | None:
     if PAD12.name not in report.spec.instrument_names:
         return None
     answers = report.answers[report.answers["instrument"] == PAD12.name]
-    wide = answers.pivot_table(index=[*KEY, "stimulus"], columns="item", values="keyed", aggfunc="last", observed=True)
-    table = wide.reset_index()
+    table = _one_row_for_each_clip(answers)
     found = attempt(
         lambda: pad_scale_quality(
             table,
             rater="participant",
             stimulus="stimulus",
             rng=generator(report.study.seed, "report", "scale quality"),
+            replicates=REPLICATES if len(table) <= MANY_ROWS else FEWER_REPLICATES,
         )
     )
     title = "Quality of the PAD questionnaire"
@@ -44,12 +51,30 @@ def scale_quality(report: StudyReport) -> Block | None:
     own = [flag for one in found.dimensions for flag in one.flags]
     notes = tuple(dict.fromkeys([_SOURCES, *found.flags, *own]))
     section = Section("scale_quality", title, header, 1, rows, notes)
-    return Block((section,), {"scale_quality": found.to_frame(), "scale_items": found.item_frame()})
+    rest = [_rest(one) for one in found.dimensions]
+    frame = found.to_frame().assign(
+        rest_r_min=[min(one, default=math.nan) for one in rest], rest_r_max=[max(one, default=math.nan) for one in rest]
+    )
+    return Block((section,), {"scale_quality": frame, "scale_items": found.item_frame()})
+
+
+def _one_row_for_each_clip(answers: pd.DataFrame) -> pd.DataFrame:
+    """Return keyed answers with a column for each item, and participant and stimulus."""
+    clips, keys = pd.factorize(pd.MultiIndex.from_frame(answers[list(KEY)]))
+    items, names = pd.factorize(answers["item"])
+    wide = np.full((len(keys), len(names)), np.nan)
+    wide[clips, items] = answers["keyed"].to_numpy(dtype=float)
+    first = answers.drop_duplicates(list(KEY))[["participant", "stimulus"]].reset_index(drop=True)
+    return pd.concat([first, pd.DataFrame(wide, columns=list(names))], axis=1)
+
+
+def _rest(found: DimensionQuality) -> list[float]:
+    return [] if found.alpha is None else [item.rest_r for item in found.alpha.items if item.rest_r is not None]
 
 
 def _row(found: DimensionQuality) -> tuple[str, ...]:
     alpha, omega, factor = found.alpha, found.omega, found.factor
-    rest = [] if alpha is None else [item.rest_r for item in alpha.items if item.rest_r is not None]
+    rest = _rest(found)
     fit = None if factor is None else factor.fit
     ratio = None if factor is None else factor.eigenvalue_ratio
     one = [

@@ -1,12 +1,13 @@
 """The ratings behind one score, as a table and as a matrix of clips and raters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 import pandas as pd
 
 from evaluation.instruments import ChoiceItem, Instrument, Item
+from evaluation.instruments.mos import MOS5
 from evaluation.report.analysis import StudyReport
 from evaluation.responses import asked_about_clips, numbers_of
 from evaluation.statistics.arrays import FloatArray
@@ -32,6 +33,10 @@ class ScoreTable:
         Ends of the scale.
     ordinal : bool
         Whether the score is the answer to one question with few ordered answers.
+    opinion : bool
+        Whether it is the mean opinion score of the five-point scale.
+    slug : str
+        The name as it stands in the names of tables and files, of its own among the scores of a report.
     """
 
     score: str
@@ -39,11 +44,8 @@ class ScoreTable:
     conditions: tuple[str, ...]
     scale: tuple[float, float]
     ordinal: bool
-
-    @property
-    def slug(self) -> str:
-        """The name as it stands in the names of tables and files."""
-        return self.score.lower().replace(".", "_")
+    opinion: bool
+    slug: str
 
     @cached_property
     def _coded(self) -> "_Coded":
@@ -56,6 +58,11 @@ class ScoreTable:
         matrix = np.full(len(counts), np.nan)
         np.divide(sums, counts, out=matrix, where=counts > 0)
         return _Coded(matrix.reshape(-1, width), [Cell(*cell) for cell in cells], list(people))
+
+    def of(self, condition: str) -> "ScoreTable":
+        """Return the ratings of one condition."""
+        own = self.table[self.table["condition"] == condition].reset_index(drop=True)
+        return replace(self, table=own, conditions=(condition,))
 
     @property
     def matrix(self) -> FloatArray:
@@ -83,7 +90,7 @@ class _Coded:
 def score_tables(report: StudyReport) -> tuple[ScoreTable, ...]:
     """Return the scores of a study that have ratings, MOS first, then in the order of the instruments."""
     owners = {name: one for one in asked_about_clips(report.spec) for name in numbers_of(one)}
-    found = []
+    found: list[ScoreTable] = []
     for name in sorted(owners, key=lambda name: name != "MOS"):
         if name not in report.scores:
             continue
@@ -92,7 +99,10 @@ def score_tables(report: StudyReport) -> tuple[ScoreTable, ...]:
         if len(table):
             rated = set(table["condition"].unique())
             conditions = tuple(one for one in report.conditions if one in rated)
-            found.append(ScoreTable(name, table, conditions, *_scale(owners[name], name)))
+            scale, ordinal = _scale(owners[name], name)
+            opinion = owners[name].name == MOS5.name
+            slug = _slug(name, {one.slug for one in found})
+            found.append(ScoreTable(name, table, conditions, scale, ordinal, opinion, slug))
     return tuple(found)
 
 
@@ -107,6 +117,15 @@ def _scale(instrument: Instrument, name: str) -> tuple[tuple[float, float], bool
     ends = [sorted(weight * end(items[one].values) for end in (min, max)) for one, weight in score.weights.items()]
     low, high = (float((score.constant + sum(end[place] for end in ends)) / score.divisor) for place in (0, 1))
     return (low, high), len(score.weights) == 1 and _few_ordered(items[next(iter(score.weights))])
+
+
+def _slug(name: str, taken: set[str]) -> str:
+    plain = name.lower().replace(".", "_")
+    slug, number = plain, 1
+    while slug in taken:
+        number += 1
+        slug = f"{plain}_{number}"
+    return slug
 
 
 def _few_ordered(item: Item) -> bool:

@@ -12,6 +12,7 @@ from evaluation.statistics import wording
 from evaluation.statistics.anova import OneWayAnova
 from evaluation.statistics.correlation import Correlation
 from evaluation.statistics.opinion import OpinionScore
+from evaluation.statistics.wording import counted
 
 __all__ = ["ALL_CONDITIONS", "Section", "frames", "headline", "label", "sections", "to_text"]
 
@@ -47,8 +48,10 @@ def sections(report: StudyReport) -> tuple[Section, ...]:
             both.append(section)
             continue
         other = used[section.name]
-        both.append(section._replace(title=f"{section.title} – all {everybody} raters"))
-        both.append(other._replace(name=f"{other.name}_used", title=f"{other.title} – the {left} raters used"))
+        both.append(section._replace(title=f"{section.title} – all {counted(everybody, 'rater')}"))
+        both.append(
+            other._replace(name=f"{other.name}_used", title=f"{other.title} – the {counted(left, 'rater')} used")
+        )
     return tuple(both)
 
 
@@ -82,7 +85,9 @@ def headline(report: StudyReport) -> list[str]:
     sentences = _headline(report)
     if report.used is None:
         return sentences
-    with_used = [f"With the {report.used.participants} raters used: {sentence}" for sentence in _headline(report.used)]
+    with_used = [
+        f"With the {counted(report.used.participants, 'rater')} used: {sentence}" for sentence in _headline(report.used)
+    ]
     return [*sentences, *with_used]
 
 
@@ -96,7 +101,9 @@ def _headline(report: StudyReport) -> list[str]:
             if found.condition is None
         ]
     if "mos5" in report.spec.instrument_names:
-        sentences.append(f"Opinion scores of the conditions: {report.mos_anova.summary()}")
+        sentences.append(
+            f"Opinion scores of the conditions, stimuli as independent groups: {report.mos_anova.summary()}"
+        )
     if report.preferences is not None:
         sentences.append(f"Preferences: {report.preferences.summary()}")
     return sentences

@@ -1,5 +1,7 @@
 """Checks that every statistic makes of its data first."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -7,8 +9,9 @@ from evaluation.errors import DataError
 
 FloatArray = npt.NDArray[np.float64]
 
-# Squares and sums of what is smaller cannot overflow.
+# Squares and sums of what is smaller cannot overflow, and squares of what is larger do not vanish.
 _LARGEST = 1e140
+_LEAST = 1e-140
 
 
 def finite_vector(values: npt.ArrayLike, *, name: str) -> FloatArray:
@@ -46,6 +49,35 @@ def finite_vector(values: npt.ArrayLike, *, name: str) -> FloatArray:
     if vector.size and np.abs(vector).max() > _LARGEST:
         raise DataError(f"{name}: a value exceeds {_LARGEST:g} in size; use larger units.")
     return vector
+
+
+def check_squares(vector: FloatArray, *, name: str) -> None:
+    """Raise DataError if finite numbers are so small that their squares would lose digits or vanish.
+
+    For statistics that are not computed in units of the data; a vector of zeros passes.
+
+    Parameters
+    ----------
+    vector : numpy.ndarray, shape (n,)
+        Finite numbers.
+    name : str
+        What they are, for the message.
+    """
+    largest = float(np.abs(vector).max(initial=0.0))
+    if 0 < largest < _LEAST:
+        raise DataError(f"{name}: no value exceeds {_LEAST:g} in size; use smaller units.")
+
+
+def standard_deviation(differences: FloatArray) -> float:
+    """Return the standard deviation (n - 1) of two or more values, given their differences from their mean.
+
+    It is formed in units of the largest difference, so that squares of small numbers do not vanish.
+    """
+    largest = float(np.abs(differences).max())
+    if not largest:
+        return 0.0
+    scaled = differences / largest
+    return largest * math.sqrt(float(scaled @ scaled) / (differences.size - 1))
 
 
 def centred(vector: FloatArray) -> tuple[float, FloatArray]:

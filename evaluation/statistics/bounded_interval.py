@@ -136,7 +136,7 @@ def bounded_interval(
     if method == "bootstrap":
         limits = bca_intervals(
             values, np.zeros(n, dtype=np.intp), 1, confidence=confidence, rng=rng, resamples=resamples
-        )
+        ).clip(low, high)
         flags = _alike(values, differences)
     else:
         per_rating = high - low if trials is None else trials
@@ -234,6 +234,7 @@ def bounded_table(
     mean, sd = _moments(values, group, n, low)
     if method == "bootstrap":
         limits = bca_intervals(values, group, len(table), confidence=confidence, rng=rng, resamples=resamples)
+        limits = limits.clip(low, high)
         still = int(np.count_nonzero(limits[:, 0] == limits[:, 1]))
         flags = _still(still, len(table))
     else:
@@ -325,6 +326,8 @@ def _check(
         raise DataError(f"The scale goes from {low} to {high}, but must have a lower and a higher end.")
     if trials is not None and not 0 < trials < np.inf:
         raise DataError(f"trials is {trials}, but must be a number above 0.")
+    finite_vector([low, high], name="the scale")
+    finite_vector([high - low if trials is None else trials], name="trials")
     wrong = np.flatnonzero((values < low) | (values > high))
     if wrong.size:
         raise DataError(f"{wrong.size} of {values.size} ratings are not on the scale from {low:g} to {high:g}.")

@@ -26,6 +26,9 @@ LEAST_RATERS = 6
 # Comparisons of sums count as equal what differs by rounding alone.
 _ROUNDING = 1e-9
 
+_NO_SCORES = "no scores, so no share of them"
+_NO_OUTLIERS = "no scores out of range, so no asymmetry of these"
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RangeCounts(Result):
@@ -124,7 +127,7 @@ def range_counts(ratings: npt.ArrayLike) -> RangeCounts:
         presentations=presentations,
         share=_ratio(out, presentations),
         asymmetry=_ratio(np.abs(above - below), out),
-        flags=_few(given),
+        flags=(*_few(given), *_without(presentations, out)),
     )
 
 
@@ -205,7 +208,9 @@ def bt500_rejection(ratings: npt.ArrayLike) -> Bt500Rejection:
             counts.above, counts.below, counts.presentations, often, even, strict=True
         )
     )
-    return Bt500Rejection(counts=counts, rejected=often & even, reasons=reasons, flags=counts.flags)
+    # No score out of range is what raters should have.
+    flags = tuple(flag for flag in counts.flags if _NO_OUTLIERS not in flag)
+    return Bt500Rejection(counts=counts, rejected=often & even, reasons=reasons, flags=flags)
 
 
 def _reason(above: int, below: int, presentations: int, *, often: bool, even: bool) -> str:
@@ -227,6 +232,15 @@ def _few(given: BoolArray) -> tuple[str, ...]:
         return ()
     who = f"fewer than {LEAST_RATERS} raters, among whom no score can be out of range"
     return (f"{few} of {rated} presentations have {who}.",)
+
+
+def _without(presentations: IntArray, out: IntArray) -> tuple[str, ...]:
+    unrated, within = int(np.count_nonzero(presentations == 0)), int(np.count_nonzero((presentations > 0) & (out == 0)))
+    return tuple(
+        f"{count} of {out.size} raters have {what}."
+        for what, count in ((_NO_SCORES, unrated), (_NO_OUTLIERS, within))
+        if count
+    )
 
 
 def _ratio(part: npt.ArrayLike, whole: IntArray) -> FloatArray:

@@ -1,7 +1,7 @@
 """Canonical correlation of two sets of measurements of the same things."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from evaluation.statistics.result import Result
 
 # A column that differs from a combination of those before it by less than this share of its own size is taken as one.
 _NEGLIGIBLE = 1e-10
+_PERFECT = "A canonical correlation is 1 to rounding, so that F has no bound."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +227,7 @@ def canonical_correlation(
         y_redundancy=tuple(((y_structure**2).mean(axis=0) * squares).tolist()),
         sequence=sequence,
         overall=(sequence[0], *traces_and_root),
-        flags=(*_flags(side_x.left_out + side_y.left_out), *(flag for test in traces_and_root for flag in test.flags)),
+        flags=_flags(side_x.left_out + side_y.left_out, (*sequence, *traces_and_root)),
     )
 
 
@@ -266,6 +267,11 @@ class _Side:
         rounding = float(np.max(np.abs(table).max(axis=0) / (sizes * norms)))
         tolerance = max(_NEGLIGIBLE, 8 * math.sqrt(len(table)) * float(np.finfo(float).eps) * rounding)
         kept = _independent(columns, tolerance)
+        if not kept:
+            raise InsufficientDataError(
+                f"The columns of {side} differ by hardly more than the rounding of their values; take away what these "
+                "have in common before they are rounded."
+            )
         basis, triangle = linalg.qr(columns[:, kept], mode="economic")
         return cls(names=names, columns=columns, kept=kept, basis=basis, triangle=triangle, tolerance=tolerance)
 
@@ -312,7 +318,7 @@ def _wilks(squares: FloatArray, remainders: FloatArray, *, n: int, p: int, q: in
     t = math.sqrt((both**2 - 4) / (rows**2 + columns**2 - 5)) if min(rows, columns) > 1 else 1.0
     df2 = (n - 1 - (p + q + 1) / 2) * t - both / 2 + 1
     if (remainders == 0).any():
-        return MultivariateTest(statistic="Wilks' Λ", value=0.0, F=math.inf, df1=both, df2=df2, p=0.0)
+        return _test("Wilks' Λ", 0.0, math.inf, both, df2)
     logarithms = np.where(squares < 0.5, np.log1p(-np.minimum(squares, 0.5)), np.log(remainders))
     logarithm = math.fsum(logarithms)
     F = math.expm1(-logarithm / t) * df2 / both
@@ -351,11 +357,13 @@ def _hotelling_lawley(value: float, *, N: float, p: int, q: int) -> Multivariate
 
 
 def _test(statistic: str, value: float, F: float, df1: float, df2: float) -> MultivariateTest:
-    return MultivariateTest(statistic=statistic, value=value, F=F, df1=df1, df2=df2, p=float(stats.f.sf(F, df1, df2)))
+    p, flags = float(stats.f.sf(F, df1, df2)), (_PERFECT,) if math.isinf(F) else ()
+    return MultivariateTest(statistic=statistic, value=value, F=F, df1=df1, df2=df2, p=p, flags=flags)
 
 
-def _flags(left_out: tuple[str, ...]) -> tuple[str, ...]:
-    return (f"Combinations of other columns, left out: {', '.join(left_out)}.",) if left_out else ()
+def _flags(left_out: tuple[str, ...], tests: Iterable[MultivariateTest]) -> tuple[str, ...]:
+    combined = (f"Combinations of other columns, left out: {', '.join(left_out)}.",) if left_out else ()
+    return (*combined, *dict.fromkeys(flag for test in tests for flag in test.flags))
 
 
 def _degrees(df: float) -> str:

@@ -13,9 +13,8 @@ from scipy import special
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray, check_confidence, finite_vector
+from evaluation.statistics.label_codes import IntArray, level_codes
 from evaluation.statistics.result import Result
-
-IntArray = npt.NDArray[np.intp]
 
 LEAST_ITEMS = 3
 """Fewer repeated items than these give a rater no correlations."""
@@ -115,7 +114,7 @@ class RaterConsistency(Result):
     Attributes
     ----------
     raters : tuple
-        The raters, in the order of their first rating.
+        The raters, in the order of their first rating, or that of a pandas categorical.
     by_rater : tuple of Consistency
         The consistency of each.
     pooled : Consistency
@@ -188,8 +187,8 @@ def rater_consistency(
         raise DataError(
             f"There are {values.size} ratings, {len(raters)} raters and {len(items)} items; each rating needs both."
         )
-    who, names = _codes(raters, "raters")
-    what, _ = _codes(items, "items")
+    who, names = level_codes(raters, name="raters")
+    what, _ = level_codes(items, name="items")
     cell = np.unique(who * (int(what.max(initial=0)) + 1) + what, return_inverse=True)[1]
     repeated = np.bincount(cell)[cell] > 1 if values.size else np.zeros(0, dtype=bool)
     if not repeated.any():
@@ -325,10 +324,3 @@ def _correlation(cells: _Cells, raters: IntArray, rounding: float) -> float | No
     if min(squares) <= rounding:
         return None
     return min(1.0, max(-1.0, float(first @ second) / math.sqrt(squares[0] * squares[1])))
-
-
-def _codes(labels: Sequence[Hashable], name: str) -> tuple[IntArray, list[Hashable]]:
-    codes, kinds = pd.factorize(np.fromiter(labels, dtype=object, count=len(labels)), use_na_sentinel=True)
-    if (codes < 0).any():
-        raise DataError(f"{name}: the one at place {int(np.flatnonzero(codes < 0)[0])} is missing.")
-    return np.asarray(codes, dtype=np.intp), list(kinds)

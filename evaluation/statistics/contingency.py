@@ -11,6 +11,7 @@ from scipy import optimize, stats
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
+from evaluation.statistics.label_codes import level_codes
 from evaluation.statistics.matrices import finite_array
 from evaluation.statistics.result import Result
 
@@ -179,9 +180,7 @@ def contingency_of_counts(
 
 
 def _places(labels: Sequence[Hashable], name: str) -> tuple[npt.NDArray[np.intp], tuple[str, ...]]:
-    places, kinds = pd.factorize(np.fromiter(labels, dtype=object, count=len(labels)), use_na_sentinel=True)
-    if (places < 0).any():
-        raise DataError(f"{name}: the category at place {int(np.flatnonzero(places < 0)[0])} is missing.")
+    places, kinds = level_codes(labels, name=name, unused=False)
     order: list[int] = list(range(len(kinds)))
     try:
         order.sort(key=lambda place: kinds[place])

@@ -11,7 +11,14 @@ from scipy import special
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import FloatArray, centred, check_confidence, finite_vector, is_constant
+from evaluation.statistics.arrays import (
+    FloatArray,
+    centred,
+    check_confidence,
+    finite_vector,
+    is_constant,
+    standard_deviation,
+)
 from evaluation.statistics.groups import group_vectors, moments
 from evaluation.statistics.noncentral_t import noncentrality_interval
 from evaluation.statistics.result import Result
@@ -295,12 +302,12 @@ def _pairs(x: npt.ArrayLike, y: npt.ArrayLike, standardiser: Standardiser, confi
     mean, spread = centred(xs - ys)
     if is_constant(np.concatenate([xs, ys]), spread):
         raise InsufficientDataError("All differences are the same, so there is no unit for their mean.")
-    sd = math.sqrt(float(spread @ spread) / (n - 1))
+    sd = standard_deviation(spread)
     low, high = noncentrality_interval(mean / sd * math.sqrt(n), n - 1, confidence=confidence)
     unit, name, method = sd, "d_z", "noncentral t"
     if standardiser == "average":
-        sides = [float(side @ side) / (n - 1) for side in (centred(xs)[1], centred(ys)[1])]
-        unit, name, method = math.sqrt((sides[0] + sides[1]) / 2), "d_av", "noncentral t in units of d_av (approximate)"
+        sides = [standard_deviation(centred(side)[1]) for side in (xs, ys)]
+        unit, name, method = math.hypot(*sides) / math.sqrt(2), "d_av", "noncentral t in units of d_av (approximate)"
     factor = sd / unit / math.sqrt(n)
     effect = EffectSize(
         name=name,

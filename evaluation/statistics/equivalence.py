@@ -11,7 +11,7 @@ from scipy import special
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import centred, finite_vector, is_constant
+from evaluation.statistics.arrays import centred, finite_vector, is_constant, standard_deviation
 from evaluation.statistics.groups import group_vectors, moments
 from evaluation.statistics.result import Result
 
@@ -260,7 +260,7 @@ def _of_one(
     mean, spread = centred(values)
     if is_constant(scale, spread):
         raise InsufficientDataError("All differences are the same, so there is no error by which to test them.")
-    sd = math.sqrt(float(spread @ spread) / (n - 1))
+    sd = standard_deviation(spread)
     return _judged(
         design, mean, (sd / math.sqrt(n), sd, float(n - 1)), bounds=bounds, standardised=standardised, alpha=alpha
     )

@@ -13,8 +13,8 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray, finite_vector
 from evaluation.statistics.groups import EPSILON, upper_tail
+from evaluation.statistics.label_codes import level_codes
 from evaluation.statistics.result import Result
-from evaluation.statistics.unit_means import labelled
 
 
 class Effect(NamedTuple):
@@ -132,7 +132,8 @@ def two_way(
     if ss_type not in (1, 2, 3):
         raise DataError(f"ss_type is {ss_type!r}, but must be 1, 2 or 3.")
     vector = finite_vector(values, name="values")
-    (rows, row_names), (columns, column_names) = labelled(first, name=names[0]), labelled(second, name=names[1])
+    (rows, _), (columns, _) = found = level_codes(first, name=names[0]), level_codes(second, name=names[1])
+    row_names, column_names = found[0].titles(names[0]), found[1].titles(names[1])
     if not vector.size == rows.size == columns.size:
         raise DataError(
             f"There are {vector.size} values, {rows.size} levels of {names[0]} and {columns.size} of {names[1]}; they "

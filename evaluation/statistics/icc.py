@@ -12,8 +12,9 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray, centred, check_confidence
 from evaluation.statistics.matrices import centred_columns, finite_array
-from evaluation.statistics.raters import counted, listed, named_table
+from evaluation.statistics.raters import listed, named_table
 from evaluation.statistics.result import Result
+from evaluation.statistics.wording import counted
 
 # Residuals that hold at least this share of the mean square of the ratings lose no more than three digits to sums.
 _WELL_SPREAD = 1e-3
@@ -280,7 +281,7 @@ def _forms(ms: MeanSquares, confidence: float) -> tuple[IntraclassCorrelation, .
                     p=float(special.fdtrc(n - 1, df2, F)),
                     ci=_interval(ci, k, mean=mean) if of_mean is not None else None,
                     confidence=confidence,
-                    flags=_flags(symbol, of_mean, ci, error),
+                    flags=_flags(symbol, of_mean, _interval(ci, k, mean=mean), error),
                 )
             )
     return tuple(found)
@@ -296,6 +297,8 @@ def _flags(symbol: str, value: float | None, ci: tuple[float, float] | None, err
         return (f"{symbol} has no value: the items differ less than the raters' errors alone would make them.",)
     if ci is None:
         return (f"{symbol} has no interval: too few items and raters for the errors they show.",)
+    if math.isinf(ci[0]):
+        return (f"{symbol}: its interval has no lower end.",)
     if error == 0:
         return (f"{symbol}: the raters leave no error at all, so F is infinite.",)
     return ()

@@ -274,7 +274,7 @@ class LightKappa(Result):
     lowest, highest : float
         Range of the pairs' kappas.
     matrix : numpy.ndarray, shape (raters, raters)
-        Kappa of each pair; NaN where there is none, and on the diagonal.
+        Kappa of each pair, 1 on the diagonal; NaN where there is none, which the flags then say.
     """
 
     kappa: float
@@ -334,7 +334,7 @@ def light_kappa(
     if coded.codes.ndim != 2:
         raise DataError(f"labels has the shape {coded.codes.shape}, but must have items x raters.")
     items, raters = coded.codes.shape
-    matrix = np.full((raters, raters), math.nan)
+    matrix = np.where(np.eye(raters, dtype=bool), 1.0, math.nan)
     for one, two in combinations(range(raters), 2):
         try:
             found = _cohen(coded.codes[:, one], coded.codes[:, two], coded.categories, weights, 0.95)

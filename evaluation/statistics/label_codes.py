@@ -1,7 +1,7 @@
-"""Labels of any kind as whole numbers."""
+"""Labels of any kind as whole numbers: the levels of a factor, and categories, among which some may be missing."""
 
 from collections.abc import Hashable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,90 @@ import pandas as pd
 from evaluation.errors import DataError
 
 IntArray = npt.NDArray[np.intp]
+
+
+class Levels(NamedTuple):
+    """The levels of a factor, as conditions, raters or items are.
+
+    Attributes
+    ----------
+    codes : numpy.ndarray of int, shape (n,)
+        Place of each label among the levels.
+    kinds : tuple
+        The different labels.
+    """
+
+    codes: IntArray
+    kinds: tuple[Any, ...]
+
+    def titles(self, name: str) -> tuple[str, ...]:
+        """Return the different labels as text; `name` says what they are.
+
+        Raises
+        ------
+        DataError
+            If two different labels are written alike.
+        """
+        titles = tuple(map(str, self.kinds))
+        if len(set(titles)) < len(titles):
+            raise DataError(f"{name}: two different labels are written alike; labels must differ as text.")
+        return titles
+
+
+def level_codes(
+    labels: Any, *, name: str, n: int | None = None, unused: bool = True, sort_numbers: bool = False
+) -> Levels:
+    """Return the levels of a factor in the order of their first appearance, or that of a pandas categorical.
+
+    Parameters
+    ----------
+    labels : sequence, shape (n,)
+        Text, numbers, or a pandas categorical.
+    name : str
+        What they are, for messages.
+    n : int, optional
+        How many there must be.
+    unused : bool
+        Whether categories of a categorical that do not occur are levels too.
+    sort_numbers : bool
+        Whether levels that are all numbers come from small to large.
+
+    Raises
+    ------
+    DataError
+        If the labels are no flat list, one is missing, or there are not `n`.
+    """
+    try:
+        codes, kinds = _factorised(labels, unused=unused)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"{name}: the labels must be a flat list of single values, such as text or numbers.") from error
+    if n is not None and codes.size != n:
+        raise DataError(f"{name}: there are {codes.size} labels for {n} values; each value needs one.")
+    missing = np.flatnonzero(codes < 0)
+    if missing.size:
+        raise DataError(f"{name}: the label at place {missing[0]} is missing; leave its value out first.")
+    if sort_numbers and not isinstance(getattr(labels, "dtype", None), pd.CategoricalDtype) and _are_numbers(kinds):
+        order = sorted(range(len(kinds)), key=lambda place: kinds[place])
+        codes, kinds = np.argsort(order)[codes], [kinds[place] for place in order]
+    return Levels(codes, tuple(kinds))
+
+
+def _factorised(labels: Any, *, unused: bool) -> tuple[IntArray, list[Any]]:
+    dtype = getattr(labels, "dtype", None)
+    if isinstance(dtype, pd.CategoricalDtype):
+        categorical = pd.Categorical(labels)
+        kept = categorical if unused else categorical.remove_unused_categories()
+        return np.asarray(kept.codes, dtype=np.intp), kept.categories.tolist()
+    # As objects, numbers and text keep their kinds, and a missing label does not turn into text.
+    array = np.fromiter(labels, dtype=object, count=len(labels)) if dtype is None else labels
+    if array.ndim != 1:
+        raise ValueError
+    codes, kinds = pd.factorize(pd.Index(array, tupleize_cols=False))
+    return np.asarray(codes, dtype=np.intp), kinds.tolist()
+
+
+def _are_numbers(kinds: Sequence[object]) -> bool:
+    return all(isinstance(kind, int | float | np.number | np.bool_) for kind in kinds)
 
 
 class LabelCodes(NamedTuple):
@@ -95,8 +179,7 @@ def _categories(
     except TypeError as error:
         raise DataError(f"{name}: each label must be a single value, such as a text or a number.") from error
     if categories is None:
-        numbers = all(isinstance(label, int | float | np.number | np.bool_) for label in found)
-        return (tuple(sorted(found)), True) if numbers else (found, False)
+        return (tuple(sorted(found)), True) if _are_numbers(found) else (found, False)
     known = tuple(categories)
     if len(set(known)) < len(known):
         raise DataError(f"{name}: a category is named twice.")

@@ -96,12 +96,11 @@ def leave_one_out(ratings: npt.ArrayLike, *, confidence: float = 0.95) -> LeaveO
     low[wide], high[wide] = np.tanh(np.arctanh(r[wide]) - half), np.tanh(np.arctanh(r[wide]) + half)
     exact = known & (number > 3) & ~wide
     low[exact] = high[exact] = r[exact]
-    unknown = int(np.count_nonzero(~known))
-    flags = (
-        (f"{unknown} of {r.size} raters have no correlation: fewer than three shared items, or nothing varies.",)
-        if unknown
-        else ()
-    )
+    without = {
+        "correlation: fewer than three shared items, or nothing varies": int(np.count_nonzero(~known)),
+        "interval: that needs four shared items": int(np.count_nonzero(known & (number <= 3))),
+    }
+    flags = tuple(f"{count} of {r.size} raters have no {what}." for what, count in without.items() if count)
     return LeaveOneOut(r=r, n=number, p=p, ci_low=low, ci_high=high, confidence=confidence, flags=flags)
 
 
@@ -130,8 +129,8 @@ def leave_one_out_correlation(ratings: npt.ArrayLike) -> FloatArray:
 def deviations(ratings: npt.ArrayLike) -> FloatArray:
     """Return each rater's mean difference from the items' means.
 
-    Where everybody rated everything this is the rater's mean less the mean of all; with missing ratings it does not
-    depend on which items a rater happened to get.
+    Where everybody rated everything this is the rater's mean less the mean of all; with missing ratings it takes out
+    which items a rater happened to get, but not who else rated them.
 
     Parameters
     ----------

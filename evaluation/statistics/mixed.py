@@ -14,8 +14,9 @@ import numpy.typing as npt
 from scipy import special
 
 from evaluation.errors import DataError, InsufficientDataError
-from evaluation.statistics.arrays import FloatArray, centred, check_confidence, finite_vector
-from evaluation.statistics.mixed_data import Design, Labels, coded, named_columns, orthonormal, residual
+from evaluation.statistics.arrays import FloatArray, centred, check_confidence, check_squares, finite_vector
+from evaluation.statistics.label_codes import Levels, level_codes
+from evaluation.statistics.mixed_data import Design, named_columns, orthonormal, residual
 from evaluation.statistics.mixed_deviance import ProfiledDeviance
 from evaluation.statistics.mixed_fit import Optimum, minimise
 from evaluation.statistics.mixed_moments import moments
@@ -90,6 +91,7 @@ def mixed_model(
     82(13).
     """
     values = finite_vector(y, name="values")
+    check_squares(values, name="values")
     columns, columns_names = named_columns(fixed, names, n=values.size, what="fixed")
     if not random:
         raise DataError("There is no random term; a mixed model needs at least one.")
@@ -155,24 +157,26 @@ def crossed_mixed_model(
     `mixed_model`.
     """
     vector = finite_vector(values, name="values")
-    condition, first = _conditions(conditions, reference, n=vector.size)
+    check_squares(vector, name="values")
+    condition, titles, first = _conditions(conditions, reference, n=vector.size)
     terms, flags = [], []
     for name, labels in (("rater", raters), ("stimulus", stimuli)):
-        levels = coded(labels, n=vector.size, name={"rater": "raters", "stimulus": "stimuli"}[name])
+        what = {"rater": "raters", "stimulus": "stimuli"}[name]
+        levels = level_codes(labels, n=vector.size, name=what, unused=False)
         term = prepared(RandomTerm(name=name, labels=labels), n=vector.size, levels=levels)
         if slopes and in_several(levels, condition):
             term = with_conditions(term, condition)
         elif slopes:
             flags.append(f"No {name} occurs in several conditions, so no effects of condition by {name} are fitted.")
         terms.append(term)
-    others = [place for place in range(len(condition.names)) if place != first]
-    columns = np.ones((vector.size, len(condition.names)))
+    others = [place for place in range(len(titles)) if place != first]
+    columns = np.ones((vector.size, len(titles)))
     columns[:, 1:] = condition.codes[:, None] == np.array(others)
-    names = ("intercept", *(condition.names[place] for place in others))
+    names = ("intercept", *(titles[place] for place in others))
     fit = _fitted(vector, columns, names, terms, method=method, confidence=confidence)
     fit["flags"] = (*flags, *fit["flags"])
     counted = columns.T @ columns
-    return CrossedMixedModel(**fit, **_compared(fit["tests"], condition.names, [first, *others], counted, confidence))
+    return CrossedMixedModel(**fit, **_compared(fit["tests"], titles, [first, *others], counted, confidence))
 
 
 def compare(null: MixedModel, full: MixedModel) -> LikelihoodRatio:
@@ -227,20 +231,21 @@ def compare(null: MixedModel, full: MixedModel) -> LikelihoodRatio:
     )
 
 
-def _conditions(conditions: Any, reference: Any, *, n: int) -> tuple[Labels, int]:
-    """Return the conditions, all with values, and the place of the one to refer to."""
-    found = coded(conditions, n=n, name="conditions", unused=True)
-    counts = np.bincount(found.codes, minlength=len(found.names))
-    for name, count in zip(found.names, counts, strict=True):
+def _conditions(conditions: Any, reference: Any, *, n: int) -> tuple[Levels, tuple[str, ...], int]:
+    """Return the conditions, all with values, their names, and the place of the one to refer to."""
+    found = level_codes(conditions, n=n, name="conditions")
+    names = found.titles("conditions")
+    counts = np.bincount(found.codes, minlength=len(names))
+    for name, count in zip(names, counts, strict=True):
         if not count:
             raise InsufficientDataError(f"The condition {name} has no values, so it cannot be compared.")
-    if len(found.names) < 2:
+    if len(names) < 2:
         raise InsufficientDataError("Fewer than two conditions have values, so there is nothing to compare.")
     if reference is None:
-        return found, 0
-    if str(reference) not in found.names:
-        raise DataError(f"There is no condition {reference} to refer to; there are {', '.join(found.names)}.")
-    return found, found.names.index(str(reference))
+        return found, names, 0
+    if str(reference) not in names:
+        raise DataError(f"There is no condition {reference} to refer to; there are {', '.join(names)}.")
+    return found, names, names.index(str(reference))
 
 
 def _fitted(

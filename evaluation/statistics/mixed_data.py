@@ -9,20 +9,11 @@ import numpy.typing as npt
 import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
-from evaluation.statistics.arrays import FloatArray
+from evaluation.statistics.arrays import FloatArray, check_squares
 from evaluation.statistics.matrices import finite_array
-from evaluation.statistics.mixed_moments import IntArray
 
 # A column of which less than this share is left after regression on the columns before it depends on them.
 _DEPENDENT = 1e-10
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Labels:
-    """The level of each value: its number, and the names of the levels."""
-
-    codes: IntArray
-    names: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,48 +35,6 @@ class Design:
     names: tuple[str, ...]
 
 
-def coded(labels: Any, *, n: int, name: str, unused: bool = False) -> Labels:
-    """Return the levels of labels in the order of their first appearance, or that of the categories.
-
-    Parameters
-    ----------
-    labels : array_like, shape (n,)
-        Names or numbers; a pandas categorical keeps its order.
-    n : int
-        How many there must be.
-    name : str
-        What they are, for messages.
-    unused : bool
-        Whether to keep categories without a value.
-
-    Raises
-    ------
-    DataError
-        If there are not n labels, they are no flat list, or one is missing.
-    """
-    try:
-        series = labels if isinstance(labels, pd.Series) else pd.Series(labels)
-        codes, levels = _factorised(series, unused=unused)
-    except (TypeError, ValueError) as error:
-        raise DataError(f"{name}: these labels are no flat list of names or numbers.") from error
-    if codes.size != n:
-        raise DataError(f"{name}: there are {codes.size} labels for {n} values; each value needs one.")
-    missing = np.flatnonzero(codes < 0)
-    if missing.size:
-        raise DataError(f"{name}: {missing.size} labels are missing (the first at place {missing[0]}).")
-    return Labels(codes=codes, names=tuple(str(level) for level in levels))
-
-
-def _factorised(series: "pd.Series[Any]", *, unused: bool) -> tuple[IntArray, "pd.Index[Any]"]:
-    if isinstance(series.dtype, pd.CategoricalDtype):
-        kept = series.cat if unused else series.cat.remove_unused_categories().cat
-        codes: Any = kept.codes.to_numpy()
-        levels = kept.categories
-    else:
-        codes, levels = pd.factorize(series)
-    return np.asarray(codes, dtype=np.intp), pd.Index(levels)
-
-
 def named_columns(matrix: Any, names: Sequence[str] | None, *, n: int, what: str) -> tuple[FloatArray, tuple[str, ...]]:
     """Return the columns of a matrix or frame as numbers, and their names.
 
@@ -102,6 +51,8 @@ def named_columns(matrix: Any, names: Sequence[str] | None, *, n: int, what: str
     names = tuple(f"x{place + 1}" for place in range(columns.shape[1])) if names is None else tuple(map(str, names))
     if len(names) != columns.shape[1]:
         raise DataError(f"{what} has {columns.shape[1]} columns, but {len(names)} names.")
+    for title, column in zip(names, columns.T, strict=True):
+        check_squares(column, name=f"{what}, {title}")
     return columns, names
 
 

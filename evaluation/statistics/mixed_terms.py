@@ -9,8 +9,9 @@ import numpy as np
 
 from evaluation.errors import InsufficientDataError
 from evaluation.statistics.arrays import FloatArray
+from evaluation.statistics.label_codes import Levels, level_codes
 from evaluation.statistics.mixed_covariance import CovarianceStructure, compound_symmetric, unstructured
-from evaluation.statistics.mixed_data import Labels, coded, named_columns, orthonormal
+from evaluation.statistics.mixed_data import named_columns, orthonormal
 from evaluation.statistics.mixed_moments import Grouping, IntArray
 from evaluation.statistics.mixed_result import RandomCorrelation, RandomEffect
 
@@ -106,7 +107,7 @@ class Term:
         return np.asarray(self.grouping.codes * self.grouping.width + column, dtype=np.intp)
 
 
-def prepared(term: RandomTerm, *, n: int, levels: Labels | None = None) -> Term:
+def prepared(term: RandomTerm, *, n: int, levels: Levels | None = None) -> Term:
     """Return a random term in the form in which it is fitted; `levels` saves reading the labels again.
 
     Raises
@@ -116,11 +117,11 @@ def prepared(term: RandomTerm, *, n: int, levels: Labels | None = None) -> Term:
     InsufficientDataError
         If there is one level only.
     """
-    levels = coded(term.labels, n=n, name=term.name) if levels is None else levels
-    if len(levels.names) < 2:
+    levels = level_codes(term.labels, n=n, name=term.name, unused=False) if levels is None else levels
+    if len(levels.kinds) < 2:
         raise InsufficientDataError(f"There is one {term.name} only, so their variance cannot be estimated.")
     if term.design is None:
-        grouping = Grouping(codes=levels.codes, levels=len(levels.names))
+        grouping = Grouping(codes=levels.codes, levels=len(levels.kinds))
         names: tuple[str, ...] = ("intercept",)
         triangle = np.eye(1)
     else:
@@ -128,20 +129,20 @@ def prepared(term: RandomTerm, *, n: int, levels: Labels | None = None) -> Term:
         design = orthonormal(*named_columns(term.design, term.effects, n=n, what=what), what=what)
         scale, names = math.sqrt(n), design.names
         triangle = design.triangle / scale
-        grouping = Grouping(codes=levels.codes, levels=len(levels.names), design=design.orthonormal * scale)
+        grouping = Grouping(codes=levels.codes, levels=len(levels.kinds), design=design.orthonormal * scale)
     structure = unstructured(grouping.width)
     return Term(name=term.name, grouping=grouping, structure=structure, triangle=triangle, effects=names)
 
 
-def in_several(levels: Labels, condition: Labels) -> bool:
+def in_several(levels: Levels, condition: Levels) -> bool:
     """Return whether a level occurs in more than one condition."""
-    cells = np.bincount(levels.codes * len(condition.names) + condition.codes)
-    return int(np.count_nonzero(cells)) > len(levels.names)
+    cells = np.bincount(levels.codes * len(condition.kinds) + condition.codes)
+    return int(np.count_nonzero(cells)) > len(levels.kinds)
 
 
-def with_conditions(term: Term, condition: Labels) -> Term:
+def with_conditions(term: Term, condition: Levels) -> Term:
     """Return a random intercept's term with further effects of each level in each condition."""
-    count = len(condition.names)
+    count = len(condition.kinds)
     design = (condition.codes[:, None] == np.arange(count)).astype(float)
     grouping = Grouping(codes=term.grouping.codes, levels=term.grouping.levels, design=design)
     return Term(

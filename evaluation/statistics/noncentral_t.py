@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
 from scipy import optimize, special
 
-# Beyond this scipy's series of the noncentral t lose digits, and the integral below takes over.
-_SERIES = 1000.0
-_MOST_POINTS = 400_000
+from evaluation.statistics.noncentral import t_exceeds
+
 # Beyond this t² / df the normal part of t changes less than the eighth digit.
 _ALL_CHI = 1e8
 
@@ -45,7 +43,7 @@ def _limit(t: float, df: float, probability: float) -> float:
         return t * math.sqrt(float(special.chdtri(df, probability)) / df)
 
     def excess(noncentrality: float) -> float:
-        return _below(t, df, noncentrality) - probability
+        return 1 - t_exceeds(t, df, noncentrality) - probability
 
     width = 1 + t / math.sqrt(2 * df)
     low, high = t - width, t + width
@@ -54,16 +52,3 @@ def _limit(t: float, df: float, probability: float) -> float:
     while excess(high) > 0:
         high += (width := 2 * width)
     return float(optimize.brentq(excess, low, high, xtol=1e-12 * (1 + t), rtol=1e-14))
-
-
-def _below(t: float, df: float, noncentrality: float) -> float:
-    if t <= _SERIES and abs(noncentrality) <= _SERIES * 10:
-        return float(special.nctdtr(df, noncentrality, t))
-    # The mean of Φ(t s - δ) over s = sqrt(chi²(df) / df), by the trapezoid rule in log s.
-    spread = math.sqrt(2 * df)
-    low = -40 / df - 1 if df < 60 else -12 / spread
-    high = min(math.sqrt(45 / df), 2.5) if df < 60 else 12 / spread
-    points = min(_MOST_POINTS, 200 + int(2 * (high - low) * max(abs(noncentrality), spread)))
-    v = np.linspace(low, high, points)
-    weights = np.exp(df * (v - np.expm1(2 * v) / 2))
-    return float(weights @ special.ndtr(t * np.exp(v) - noncentrality) / weights.sum())

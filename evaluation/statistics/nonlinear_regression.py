@@ -21,6 +21,8 @@ Model = Callable[..., Any]
 
 # The steepest way down the fitted surface may explain no more than this share of the residuals.
 _CONVERGED = 1e-6
+# Of small residuals, rounding of y and of the model alone can be more than that.
+_ROUNDING = 8 * EPSILON
 _EXACT_TO = 64 * EPSILON
 _FAR_OFF = 1e100
 _TOLERANCE = 1e-15
@@ -183,6 +185,9 @@ def _described(
     se = np.sqrt(np.diagonal(covariance))
     half = special.stdtrit(df, (1 + level) / 2) * se
     exact = float(np.abs(residuals).max()) <= _EXACT_TO * problem.size
+    flags = ["The model reproduces y to rounding, so standard errors are those of rounding."] if exact else []
+    if offset > _CONVERGED:
+        flags.append("The residuals are so small that rounding costs the standard errors digits.")
     ci = np.column_stack([solution - half, solution + half])
     for array in (solution, se, ci, covariance, residuals):
         array.flags.writeable = False
@@ -199,7 +204,7 @@ def _described(
         relative_offset=offset,
         derivatives=derivatives,
         residuals=residuals,
-        flags=("The model reproduces y to rounding, so standard errors are those of rounding.",) if exact else (),
+        flags=tuple(flags),
     )
 
 
@@ -282,7 +287,8 @@ def _minimum(problem: _Problem, start: FloatArray) -> FloatArray:
             max_nfev=5000,
         )
         solution = _polished(problem, np.asarray(found.x, dtype=float))
-        if _offset(problem, solution) <= _CONVERGED:
+        offset, rounding = _offset(problem, solution)
+        if offset <= max(_CONVERGED, rounding):
             return solution
     # Parameters that stand for each other keep the search from ending; then that is what to say.
     _judge(problem, solution)
@@ -291,30 +297,32 @@ def _minimum(problem: _Problem, start: FloatArray) -> FloatArray:
 
 def _polished(problem: _Problem, parameters: FloatArray) -> FloatArray:
     """Take Gauss and Newton's full steps as long as they lead nearer to the minimum."""
-    offset = _offset(problem, parameters)
+    offset, _ = _offset(problem, parameters)
     for _ in range(10):
         J, sizes = _unit_columns(problem.jacobian(parameters))
         step = linalg.lstsq(J, problem.residuals(parameters), check_finite=False)[0] / sizes
         tried = parameters - step
-        reached = _offset(problem, tried)
+        reached, _ = _offset(problem, tried)
         if not reached < offset:
             break
         parameters, offset = tried, reached
     return parameters
 
 
-def _offset(problem: _Problem, parameters: FloatArray) -> float:
+def _offset(problem: _Problem, parameters: FloatArray) -> tuple[float, float]:
+    """Return the relative offset, and how large one rounding alone can make."""
     residuals = problem.residuals(parameters)
     size = float(np.abs(residuals).max())
     if size <= _EXACT_TO * problem.size:
-        return 0.0
-    if not size < _FAR_OFF:
-        return math.inf
+        return 0.0, 0.0
     n, p = residuals.size, parameters.size
     Q = linalg.qr(_unit_columns(problem.jacobian(parameters))[0], mode="economic", check_finite=False)[0]
     along = Q @ (Q.T @ residuals)
     across = float(linalg.norm(residuals - along))
-    return float(linalg.norm(along)) / across * math.sqrt((n - p) / p) if across > 0 else math.inf
+    if not (size < _FAR_OFF and across > 0):
+        return math.inf, 0.0
+    unit = math.sqrt((n - p) / p) / across
+    return float(linalg.norm(along)) * unit, _ROUNDING * problem.size * math.sqrt(n) * unit
 
 
 def _judge(problem: _Problem, parameters: FloatArray) -> tuple[float, FloatArray]:
@@ -328,7 +336,7 @@ def _judge(problem: _Problem, parameters: FloatArray) -> tuple[float, FloatArray
             "solution."
         )
     opposite = linalg.solve_triangular(R, np.eye(parameters.size)) / sizes[:, None]
-    return _offset(problem, parameters), opposite @ opposite.T
+    return _offset(problem, parameters)[0], opposite @ opposite.T
 
 
 def _unit_columns(J: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -13,10 +13,10 @@ from scipy import special
 from evaluation.errors import InsufficientDataError
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray, check_confidence
-from evaluation.statistics.label_codes import IntArray
+from evaluation.statistics.label_codes import IntArray, level_codes
 from evaluation.statistics.multiplicity import adjusted_p
 from evaluation.statistics.ordinal import LogOdds, log_odds_row
-from evaluation.statistics.ordinal_data import Categories, distinct_rows, level_codes, ordered_categories, predictors
+from evaluation.statistics.ordinal_data import Categories, distinct_rows, ordered_categories, predictors
 from evaluation.statistics.ordinal_maximum import fit_mixed
 from evaluation.statistics.ordinal_mixed import CumulativeLogitMixed, mixed_result, random_factors
 from evaluation.statistics.ordinal_odds import ProportionalOdds
@@ -139,7 +139,7 @@ def crossed_cumulative_logit(
     check_confidence(confidence)
     answers = ordered_categories(ratings, name="ratings")
     n = answers.codes.size
-    codes, names = level_codes(conditions, name="conditions", n=n)
+    codes, names = level_codes(conditions, name="conditions", n=n, sort_numbers=True)
     factors = random_factors(list(zip(_FACTORS, (raters, stimuli), strict=True)), n=n)
     counts = _counts(codes, names, answers)
     fixed = predictors(_dummies(codes, len(names)), n=n, names=[str(name) for name in names[1:]])

@@ -2,7 +2,7 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +10,7 @@ import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics.arrays import FloatArray, finite_vector
-from evaluation.statistics.label_codes import IntArray, label_codes
+from evaluation.statistics.label_codes import IntArray
 from evaluation.statistics.matrices import centred_columns, constant_columns, finite_array
 
 _MOST_CATEGORIES = 256
@@ -175,24 +175,6 @@ def _of_numbers(y: npt.ArrayLike, name: str) -> tuple[IntArray, tuple[Hashable, 
     return codes, tuple(float(value) for value in values), []
 
 
-def level_codes(labels: Sequence[Hashable], *, name: str, n: int) -> tuple[IntArray, tuple[Hashable, ...]]:
-    """Return the place of each label among the levels of a factor, and these, in the order of `label_codes`.
-
-    Raises
-    ------
-    DataError
-        If there are not `n` labels, or one is missing.
-    """
-    # Sequences of labels are arrays to numpy, which its type does not say of labels of every kind.
-    found = label_codes(cast(npt.ArrayLike, labels), name=name)
-    if found.codes.shape != (n,):
-        raise DataError(f"{name}: there are {len(labels)} labels for {n} answers; each answer needs one.")
-    missing = np.flatnonzero(found.codes < 0)
-    if missing.size:
-        raise DataError(f"{name}: the label at place {missing[0]} is missing; leave its answer out first.")
-    return found.codes, found.categories
-
-
 def predictors(fixed: npt.ArrayLike | pd.DataFrame, *, n: int, names: Sequence[str] | None = None) -> Predictors:
     """Return fixed predictors in columns that are easy to compute with.
 
@@ -285,8 +267,3 @@ def distinct_rows(
         cuts=cuts,
         factors=tuple(factor[first] for factor in factors),
     )
-
-
-def used_levels(codes: IntArray) -> IntArray:
-    """Return codes without those that never occur."""
-    return np.unique(codes, return_inverse=True)[1].astype(np.intp)

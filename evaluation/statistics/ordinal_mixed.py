@@ -8,16 +8,14 @@ import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics.arrays import check_confidence
-from evaluation.statistics.label_codes import IntArray
+from evaluation.statistics.label_codes import IntArray, level_codes
 from evaluation.statistics.ordinal import OrdinalModel, fit_flags, in_old_columns
 from evaluation.statistics.ordinal_data import (
     Categories,
     Predictors,
     distinct_rows,
-    level_codes,
     ordered_categories,
     predictors,
-    used_levels,
 )
 from evaluation.statistics.ordinal_maximum import NO_SD, MixedFit, fit_mixed
 
@@ -122,7 +120,7 @@ def random_factors(random: Sequence[tuple[str, Sequence[Hashable]]], *, n: int) 
     InsufficientDataError
         If a factor has only one level, or as many as there are answers.
     """
-    factors = {str(name): used_levels(level_codes(labels, name=str(name), n=n)[0]) for name, labels in random}
+    factors = {str(name): level_codes(labels, name=str(name), n=n, unused=False).codes for name, labels in random}
     if not factors or len(factors) < len(random):
         raise DataError("A mixed model needs at least one random factor, and each needs a name of its own.")
     for name, codes in factors.items():

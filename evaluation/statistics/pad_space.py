@@ -351,9 +351,9 @@ def _scale(name: str, slope: float, ci: tuple[float, float]) -> list[str]:
     rounding = 1e-9 * abs(slope)
     if ci[0] - rounding <= 1 <= ci[1] + rounding:
         return []
-    text = f"{name}: the slope of {wording.number(slope)} shows a difference of scale (its interval leaves out 1)"
+    text = f"{name}: the slope of {wording.number(slope)} differs from 1, which its interval leaves out"
     known = [
-        f"; it agrees with {value:g}, as of {what}"
+        f"; it agrees with {value:g}, which would come of {what}"
         for value, what in KNOWN_SCALES.items()
         if ci[0] - rounding <= value <= ci[1] + rounding
     ]

@@ -13,12 +13,14 @@ from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.masked_pairs import FEWEST_COMMON, MaskedRatings
 from evaluation.statistics.matrices import centred_columns, constant_columns, finite_array
-from evaluation.statistics.raters import counted, listed, named_table
+from evaluation.statistics.raters import listed, named_table
 from evaluation.statistics.result import Result
 from evaluation.statistics.threads import one_thread
+from evaluation.statistics.wording import counted
 
 # Columns that vary by at least this share of their mean square lose no more than two digits to their mean.
 _WELL_SPREAD = 1e-2
+_ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,8 +235,10 @@ def _tested(
     agreed, disagreed = (1 + (k - 1) * r) / k, (k - 1) * (1 - r) / k
     if agreed <= 0:
         F, p = 0.0, 1.0
+    elif disagreed <= _ROUNDING:
+        F, p, flags = math.inf, 0.0, (*flags, "All raters agree perfectly but for level and scale, so F has no bound.")
     else:
-        F = (k - 1) * agreed / disagreed if disagreed > 0 else math.inf
+        F = (k - 1) * agreed / disagreed
         p = float(special.betainc(df2 / 2, df1 / 2, disagreed))
     return MeanPairwiseCorrelation(
         r=r, items=items, raters=raters, pairs=pairs, F=F, df1=df1, df2=df2, p=p, flags=flags

@@ -44,8 +44,8 @@ class Power(Result):
         Level of the test.
     power : float
         Probability that the test finds the effect.
-    noncentrality : float
-        That of the F or t distribution; NaN for a correlation, whose power is a mixture.
+    noncentrality : float or None
+        That of the F or t distribution; None for a correlation, whose power is a mixture.
     df : tuple of float
         Degrees of freedom of the test.
     """
@@ -57,7 +57,7 @@ class Power(Result):
     n: int
     alpha: float
     power: float
-    noncentrality: float
+    noncentrality: float | None
     df: tuple[float, ...]
 
     def apa(self) -> str:
@@ -77,7 +77,7 @@ class Power(Result):
                 "n": [self.n],
                 "alpha": [self.alpha],
                 "power": [self.power],
-                "noncentrality": [self.noncentrality],
+                "noncentrality": [math.nan if self.noncentrality is None else self.noncentrality],
                 "df_1": [self.df[0] if len(self.df) > 1 else math.nan],
                 "df_2": [self.df[-1]],
             }
@@ -347,7 +347,7 @@ def correlation_power(r: float, n: int, *, alpha: float = 0.05) -> Power:
         n=int(n),
         alpha=alpha,
         power=correlation_exceeds(critical, r * r, n),
-        noncentrality=math.nan,
+        noncentrality=None,
         df=(n - 2,),
     )
 

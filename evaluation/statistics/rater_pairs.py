@@ -22,8 +22,9 @@ from evaluation.statistics.pairwise import (
     left_out_raters,
     standardised,
 )
-from evaluation.statistics.raters import counted, named_table
+from evaluation.statistics.raters import named_table
 from evaluation.statistics.result import Result
+from evaluation.statistics.wording import counted
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -52,8 +52,3 @@ def listed(names: Sequence[str]) -> str:
     if len(names) <= _SPELT_OUT:
         return ", ".join(names)
     return f"{', '.join(names[:_SPELT_OUT])} and {len(names) - _SPELT_OUT} more"
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, for instance ``1 item`` or ``3 items``."""
-    return f"{number:,} {noun}" if number == 1 else f"{number:,} {noun}s"

@@ -12,7 +12,14 @@ from scipy import linalg, special
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics import wording
-from evaluation.statistics.arrays import FloatArray, centred, check_confidence, finite_vector, is_constant
+from evaluation.statistics.arrays import (
+    FloatArray,
+    centred,
+    check_confidence,
+    check_squares,
+    finite_vector,
+    is_constant,
+)
 from evaluation.statistics.groups import EPSILON, column_names, upper_tail
 from evaluation.statistics.least_squares import Factors, factorise, solve
 from evaluation.statistics.matrices import finite_array
@@ -232,6 +239,8 @@ def _checked(
     if target.size != n:
         raise DataError(f"X has {n} rows and y has {target.size} values, but a regression needs as many of both.")
     titles = column_names(None if names is None else [str(name) for name in names], p)
+    for name, column in zip((*titles, "y"), (*table.T, target), strict=True):
+        check_squares(column, name=name)
     if p < 1 or n <= p:
         raise InsufficientDataError(f"A regression needs a column, and more rows than columns; there are {n} x {p}.")
     return table, target, titles
@@ -255,7 +264,7 @@ def _fitted(table: FloatArray, target: FloatArray, names: tuple[str, ...], confi
     df_model, df_residual = p - has_constant, n - p
     variance = rss / df_residual
     covariance = variance * solution.inverse
-    se = np.sqrt(np.diagonal(covariance))
+    se = math.sqrt(variance) * np.sqrt(np.diagonal(solution.inverse))
     with np.errstate(divide="ignore", invalid="ignore"):
         t = solution.coefficients / se if rss > 0 else np.full(p, math.nan)
     half = special.stdtrit(df_residual, (1 + confidence) / 2) * se

@@ -2,7 +2,6 @@
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +9,7 @@ import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics.arrays import FloatArray, finite_vector
+from evaluation.statistics.label_codes import level_codes
 from evaluation.statistics.result import Result
 
 # Units that a flag names before it says how many more there are.
@@ -74,7 +74,8 @@ def unit_means(values: npt.ArrayLike, conditions: Sequence[Hashable], units: Seq
     Jia et al. (2013), section 5.4 and Table 10, average the ratings of each sentence over raters.
     """
     ratings, given = _ratings(values)
-    (rows, row_names), (columns, column_names) = labelled(units, name="units"), labelled(conditions, name="conditions")
+    (rows, _), (columns, _) = found = level_codes(units, name="units"), level_codes(conditions, name="conditions")
+    row_names, column_names = found[0].titles("units"), found[1].titles("conditions")
     if not ratings.size == rows.size == columns.size:
         raise DataError(
             f"There are {ratings.size} ratings, {columns.size} conditions and {rows.size} units; they must be as many."
@@ -105,47 +106,6 @@ def unit_means(values: npt.ArrayLike, conditions: Sequence[Hashable], units: Seq
         left_out=left_out,
         flags=_left_out_flag(left_out),
     )
-
-
-def labelled(labels: Sequence[Hashable], *, name: str) -> tuple[npt.NDArray[np.int64], tuple[str, ...]]:
-    """Return the place of each label among the different ones, and those as text.
-
-    Parameters
-    ----------
-    labels : sequence, shape (n,)
-        Text, numbers, or a pandas categorical, whose categories then set the order.
-    name : str
-        What they are, for the message.
-
-    Raises
-    ------
-    DataError
-        If a label is missing, or two different labels are written alike.
-    """
-    dtype = getattr(labels, "dtype", None)
-    if isinstance(dtype, pd.CategoricalDtype):
-        codes, names = np.asarray(_categorical(labels).codes), dtype.categories
-    else:
-        # As objects, numbers and text keep their kinds, and a missing label does not turn into text.
-        array = np.fromiter(labels, dtype=object, count=len(labels)) if dtype is None else np.asarray(labels)
-        if array.ndim != 1:
-            raise DataError(f"{name}: the labels have {array.ndim} dimensions, but must be a flat list.")
-        try:
-            codes, names = pd.factorize(pd.Index(array))
-        except TypeError as error:
-            raise DataError(f"{name}: each label must be a single value, such as a text or a number.") from error
-    places = codes.astype(np.int64)
-    if (places < 0).any():
-        raise DataError(f"{name}: the label at place {int(np.argmax(places < 0))} is missing.")
-    titles = tuple(map(str, names))
-    if len(set(titles)) < len(titles):
-        raise DataError(f"{name}: two different labels are written alike; labels must differ as text.")
-    return places, titles
-
-
-def _categorical(labels: Any) -> Any:
-    """Return the accessor of a series of categories, or the categorical itself."""
-    return labels.cat if isinstance(labels, pd.Series) else labels
 
 
 def _ratings(values: npt.ArrayLike) -> tuple[FloatArray, npt.NDArray[np.bool_]]:

@@ -3,7 +3,9 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from numbers import Real
 
+import numpy as np
 import pandas as pd
 
 from evaluation.errors import DataError, InsufficientDataError
@@ -130,8 +132,9 @@ def votes_of_counts(labels: Sequence[str], counts: Sequence[int]) -> Votes:
     if len(set(labels)) < len(labels):
         raise DataError("Two categories have the same name, but each must have its own.")
     for label, count in zip(labels, counts, strict=True):
-        if not (math.isfinite(count) and count >= 0 and count == int(count)):
-            raise DataError(f"{label} has {count} votes, but must have a whole number of 0 or more.")
+        is_number = isinstance(count, Real | np.bool_)
+        if not (is_number and math.isfinite(count) and count >= 0 and count == int(count)):
+            raise DataError(f"{label} has {count!r} votes, but must have a whole number of 0 or more.")
     total = sum(int(count) for count in counts)
     if not total:
         raise InsufficientDataError("There are no votes; at least one is needed.")

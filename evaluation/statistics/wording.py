@@ -29,3 +29,8 @@ def interval(low: float, high: float, *, confidence: float, bounded: bool = Fals
     """Return ``95% CI [0.31, 0.62]``; without leading zeros if `bounded` by 1."""
     write = share if bounded else number
     return f"{100 * confidence:g}% CI [{write(low)}, {write(high)}]"
+
+
+def counted(count: int, noun: str, plural: str | None = None) -> str:
+    """Return a number with its noun, for instance ``1 item`` or ``3 items``."""
+    return f"{count:,} {noun if count == 1 else plural or f'{noun}s'}"

@@ -1,7 +1,7 @@
 """What was collected: every counting answer."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import Any, NamedTuple
 
@@ -113,6 +113,15 @@ class _About(NamedTuple):
     clips: tuple[Shown, ...]
 
 
+class _Place(NamedTuple):
+    """What a key of the stored answers stands for; `word` is None unless the instrument asks about words."""
+
+    key: str
+    item: str
+    clip: int
+    word: int | None
+
+
 class _Page(NamedTuple):
     """The answers to one instrument on one page."""
 
@@ -121,28 +130,26 @@ class _Page(NamedTuple):
     raw: Mapping[str, Any]
     display: Mapping[str, Any]
 
-    def rows(self) -> Iterator[tuple[Any, ...]]:
-        """Yield clip, item, word, raw, flipped, place and keyed, in the order of clips or words, then of items."""
+    def rows(self, places: Sequence[_Place]) -> Iterator[tuple[Any, ...]]:
+        """Yield clip, item, word, raw, flipped, place and keyed of each answer."""
         order = {item: place for place, item in enumerate(self.display.get("order", ()), start=1)}
-        items = {item.id: place for place, item in enumerate(self.instrument.items)}
-        split = {key: self._split(key) for key in self.keyed}
-        for key in sorted(self.keyed, key=lambda key: (split[key][1], items.get(split[key][0], len(items)))):
-            item, place = split[key]
-            yield (
-                place if self.instrument.per == "clip" else 1,
-                item,
-                place if self.instrument.per == "word" else None,
-                _plain(self.raw.get(key, self.keyed[key])),
-                key in self.display.get("flipped", ()),
-                order.get(key),
-                _plain(self.keyed[key]),
-            )
+        flipped, raw, keyed = self.display.get("flipped", ()), self.raw, self.keyed
+        for key, item, clip, word in places:
+            answer = keyed[key]
+            yield clip, item, word, _plain(raw.get(key, answer)), key in flipped, order.get(item), _plain(answer)
 
-    def _split(self, key: str) -> tuple[str, int]:
-        if self.instrument.per == "trial":
-            return key, 1
-        item, _, place = key.rpartition("-")
-        return item, int(place)
+    def places(self) -> list[_Place]:
+        """Return what the keys stand for, in the order of clips or words, then of items."""
+        items = {item.id: place for place, item in enumerate(self.instrument.items)}
+        found = [self._place(key) for key in self.keyed]
+        return sorted(found, key=lambda one: (one.word or one.clip, items.get(one.item, len(items))))
+
+    def _place(self, key: str) -> _Place:
+        per = self.instrument.per
+        if per == "trial":
+            return _Place(key, key, 1, None)
+        item, _, number = key.rpartition("-")
+        return _Place(key, item, int(number) if per == "clip" else 1, int(number) if per == "word" else None)
 
 
 def _plain(answer: Any) -> Any:
@@ -211,7 +218,14 @@ def _counting(given: _Given) -> Ints:
 
 def _table(given: _Given, counting: Ints) -> pd.DataFrame:
     """Return a row for each item of each page that counts."""
-    rows = [list(one.rows()) for one in given.pages]
+    # Pages of one instrument have the same keys, but for answers that are missing.
+    places: dict[tuple[str, frozenset[str]], list[_Place]] = {}
+    rows = []
+    for one in given.pages:
+        keys = (one.instrument.name, frozenset(one.keyed))
+        if keys not in places:
+            places[keys] = one.places()
+        rows.append(list(one.rows(places[keys])))
     length = np.array([len(one) for one in rows], dtype=np.int64)
     page = given.page[counting]
     begin, times = np.cumsum(length) - length, length[page]
@@ -254,12 +268,8 @@ def _names(lists: list[list[str]], which: Ints, place: Ints) -> "pd.Categorical[
 
 
 def _columns(rows: list[list[tuple[Any, ...]]]) -> list[list[Any]]:
-    columns: list[list[Any]] = [[], [], [], [], [], [], []]
-    for one in rows:
-        for entry in one:
-            for column, value in zip(columns, entry, strict=True):
-                column.append(value)
-    return columns
+    flat = [entry for one in rows for entry in one]
+    return [list(column) for column in zip(*flat, strict=True)] if flat else [[], [], [], [], [], [], []]
 
 
 def _objects(values: list[Any]) -> npt.NDArray[np.object_]:

@@ -1,6 +1,7 @@
 """What is known of raters: their checks, repeats and times, and what screening makes of them."""
 
 from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import pandas as pd
 from sqlalchemy import select
@@ -56,26 +57,44 @@ def _checks(session: Session, study: Study, rows: pd.DataFrame, part: str | None
     known = {(number + 1, position): place for number, position, place in places}
     checking = rows if part is None else rows[rows["part"] == part]
     checking = checking[checking["kind"].isin(_CHECKING)]
+    verdicts: dict[tuple[object, ...], bool | None] = {}
     found = []
-    for _, own in checking.groupby(["participant", "trial"], sort=True):
-        participant, position = (int(one) for one in own[["participant", "trial"]].iloc[0])
-        about, kind = str(own["part"].iloc[0]), str(own["kind"].iloc[0])
-        accept = accepted(spec.part(about), kind, known.get((participant, position)))
-        if accept:
-            found.append((participant, about, position, kind, all(passes(accept, one) for one in _by_place(own))))
+    pages: dict[tuple[int, int], list[_Answer]] = {}
+    about: dict[tuple[int, int], tuple[str, str]] = {}
+    columns = ["participant", "trial", "part", "kind", "instrument", "item", "word", "keyed"]
+    for participant, position, name, kind, *answer in checking[columns].itertuples(index=False, name=None):
+        pages.setdefault((participant, position), []).append(_Answer(*answer))
+        about[participant, position] = (name, kind)
+    for key in sorted(pages):
+        name, kind = about[key]
+        page = (name, kind, known.get(key), tuple(pages[key]))
+        if page not in verdicts:
+            accept = accepted(spec.part(name), kind, known.get(key))
+            verdicts[page] = all(passes(accept, one) for one in _by_place(pages[key])) if accept else None
+        if (passed := verdicts[page]) is not None:
+            found.append((key[0], name, key[1], kind, passed))
     return pd.DataFrame(found, columns=list(CHECK_COLUMNS)).astype({"passed": bool})
 
 
-def _by_place(rows: pd.DataFrame) -> list[dict[str, dict[str, object]]]:
+class _Answer(NamedTuple):
+    """An answer on a page; `word` is missing unless it is about a word."""
+
+    instrument: str
+    item: str
+    word: Any
+    keyed: Any
+
+
+def _by_place(answers: Sequence[_Answer]) -> list[dict[str, dict[str, object]]]:
     """Return the answers of a trial as known answers name them: for each word, if it asks about words."""
-    spoken = rows["word"].dropna().unique().tolist()
+    words = sorted({one.word for one in answers if not pd.isna(one.word)})
     places: list[dict[str, dict[str, object]]] = []
-    for word in sorted(spoken) or [None]:
+    for word in words or [None]:
         about: dict[str, dict[str, object]] = {}
-        own = rows if word is None else rows[rows["word"].isna() | (rows["word"] == word)]
-        for instrument, item, keyed in own[["instrument", "item", "keyed"]].itertuples(index=False):
-            single = isinstance(keyed, tuple) and len(keyed) == 1
-            about.setdefault(instrument, {})[item] = keyed[0] if single else keyed
+        for instrument, item, own, keyed in answers:
+            if pd.isna(own) or own == word:
+                single = isinstance(keyed, tuple) and len(keyed) == 1
+                about.setdefault(instrument, {})[item] = keyed[0] if single else keyed
         places.append(about)
     return places
 

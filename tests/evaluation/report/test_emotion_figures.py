@@ -20,6 +20,11 @@ def annotations():
     return np.clip(np.repeat(centres, 12, axis=0) + 0.1 * rng.normal(size=(72, 3)), -1, 1), np.repeat(EMOTIONS, 12)
 
 
+@pytest.fixture(scope="module")
+def drawn(annotations):
+    return pad_by_category_svg(*annotations)
+
+
 def texts(svg):
     return ["".join(node.itertext()).strip() for node in ET.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
 
@@ -28,8 +33,8 @@ def outlines(axes):
     return [line for line in axes.lines if len(line.get_xdata()) > 100]
 
 
-def test_three_panels_with_a_legend(annotations):
-    shown = texts(pad_by_category_svg(*annotations))
+def test_three_panels_with_a_legend(drawn):
+    shown = texts(drawn)
     assert shown.count("Pleasure (P)") == 2
     assert shown.count("Arousal (A)") == 2
     assert shown.count("Dominance (D)") == 2
@@ -63,8 +68,8 @@ def test_colour_and_shape_together_tell_56_categories_apart():
     assert len(looks) == 56
 
 
-def test_the_same_annotations_give_the_same_files(annotations):
-    assert pad_by_category_svg(*annotations) == pad_by_category_svg(*annotations)
+def test_the_same_annotations_give_the_same_files(annotations, drawn):
+    assert pad_by_category_svg(*annotations) == drawn
     png = pad_by_category_png(*annotations, dpi=50)
     assert png == pad_by_category_png(*annotations, dpi=50)
     assert png.startswith(b"\x89PNG")
@@ -73,10 +78,9 @@ def test_the_same_annotations_give_the_same_files(annotations):
     assert width == 550
 
 
-def test_every_reference_inside_carries_the_name(annotations):
-    svg = pad_by_category_svg(*annotations)
-    ids = set(re.findall(r'\bid="([^"]+)"', svg))
-    used = set(re.findall(r'href="#([^"]+)"', svg)) | set(re.findall(r"url\(#([^)]+)\)", svg))
+def test_every_reference_inside_carries_the_name(drawn):
+    ids = set(re.findall(r'\bid="([^"]+)"', drawn))
+    used = set(re.findall(r'href="#([^"]+)"', drawn)) | set(re.findall(r"url\(#([^)]+)\)", drawn))
     assert used
     assert used <= ids
     assert all(found.startswith("pad-by-category") for found in ids)

@@ -8,10 +8,15 @@ import pytest
 from evaluation.errors import EvaluationError
 from evaluation.report import figures
 from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
-from evaluation.report.full import FullReport
 from evaluation.simulate import simulate_responses
 
 EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
+
+
+@pytest.fixture(scope="module")
+def drawn(report) -> dict[str, str]:
+    """Every figure of the report."""
+    return {name: figures.draw(name, report) for name in figures.NAMES}
 
 
 def texts(svg: str) -> list[str]:
@@ -20,14 +25,14 @@ def texts(svg: str) -> list[str]:
 
 @pytest.mark.parametrize("name", figures.NAMES)
 class TestEveryFigure:
-    def test_it_is_svg_with_a_caption(self, name, report):
-        svg = figures.draw(name, report)
+    def test_it_is_svg_with_a_caption(self, name, drawn):
+        svg = drawn[name]
         assert ET.fromstring(svg).tag == "{http://www.w3.org/2000/svg}svg"
         assert "<script" not in svg
         assert figures.caption(name).endswith(".")
 
-    def test_the_same_report_gives_the_same_file(self, name, report):
-        assert figures.draw(name, report) == figures.draw(name, report)
+    def test_the_same_report_gives_the_same_file(self, name, report, drawn):
+        assert figures.draw(name, report) == drawn[name]
 
     @pytest.mark.parametrize("participants", [0, 1, 2])
     def test_it_can_be_drawn_from_the_first_answer_on(self, name, demo, participants):
@@ -36,8 +41,8 @@ class TestEveryFigure:
             svg = figures.draw(name, analyse(demo, simulate_responses(demo, participants, seed=1)))
         assert texts(svg)
 
-    def test_every_reference_inside_leads_somewhere_and_carries_the_name(self, name, report):
-        svg = figures.draw(name, report)
+    def test_every_reference_inside_leads_somewhere_and_carries_the_name(self, name, drawn):
+        svg = drawn[name]
         ids = set(re.findall(r'\bid="([^"]+)"', svg))
         used = set(re.findall(r'href="#([^"]+)"', svg)) | set(re.findall(r"url\(#([^)]+)\)", svg))
         assert used
@@ -45,8 +50,8 @@ class TestEveryFigure:
         assert all(found.startswith(name.replace("_", "-")) for found in ids)
 
 
-def test_the_scatter_names_stimuli_and_correlations(report):
-    shown = texts(figures.draw("reverse_evaluation", report))
+def test_the_scatter_names_stimuli_and_correlations(drawn):
+    shown = texts(drawn["reverse_evaluation"])
     assert shown.count("Happy") == 3
     titles = [text for text in shown if " r = " in text]
     assert [title.split(":")[0] for title in titles] == ["Pleasure", "Arousal", "Dominance"]
@@ -60,8 +65,8 @@ def test_the_scatter_names_no_more_stimuli_than_can_be_read(demo, report, monkey
     assert [text for text in shown if " r = " in text]
 
 
-def test_the_opinion_figure_names_means_and_the_scale(report):
-    shown = texts(figures.draw("mos_by_condition", report))
+def test_the_opinion_figure_names_means_and_the_scale(report, drawn):
+    shown = texts(drawn["mos_by_condition"])
     assert {f"{found.result.mean:.2f}" for found in report.mos_by_condition} <= set(shown)
     assert any("Expressive" in text for text in shown)
 
@@ -90,8 +95,8 @@ def test_texts_of_a_study_are_no_markup_and_no_formula(demo, answers):
     assert "<script>x</script> $\\frac$" in texts(svg)
 
 
-def test_each_figure_belongs_to_a_section(report):
-    assert set(figures.NAMES) <= {section.name for section in FullReport(report).sections}
+def test_each_figure_belongs_to_a_section(crossed):
+    assert set(figures.NAMES) <= {section.name for section in crossed.sections}
 
 
 def test_an_unknown_figure_is_named_with_those_there_are(report):

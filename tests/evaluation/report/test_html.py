@@ -1,6 +1,7 @@
 from html.parser import HTMLParser
 
 import pandas as pd
+import pytest
 from markupsafe import escape
 
 from evaluation.report import html
@@ -8,6 +9,12 @@ from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
 
 EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
 VOID = {"meta", "link", "br", "img", "hr", "input"}
+
+
+@pytest.fixture(scope="module")
+def written(report) -> str:
+    """The page of the report."""
+    return html.render(report)
 
 
 class Page(HTMLParser):
@@ -38,22 +45,21 @@ class Page(HTMLParser):
         assert self.open.pop() == tag
 
 
-def test_the_page_is_whole_and_needs_nothing_from_elsewhere(report):
-    page = Page(html.render(report))
+def test_the_page_is_whole_and_needs_nothing_from_elsewhere(written):
+    page = Page(written)
     assert page.tags.count("svg") == 2
     assert not {"script", "link", "iframe", "img"} & set(page.tags)
     assert all(address.startswith("#") for address in page.addresses)
     assert len(page.ids) == len(set(page.ids))
 
 
-def test_it_says_what_the_report_says(report):
-    text = html.render(report)
-    assert escape(report.mos_anova.summary()) in text
-    assert "30 participants" in text
+def test_it_says_what_the_report_says(report, written):
+    assert escape(report.mos_anova.summary()) in written
+    assert "30 participants" in written
 
 
-def test_the_same_report_gives_the_same_page(report):
-    assert html.render(report) == html.render(report)
+def test_the_same_report_gives_the_same_page(report, written):
+    assert html.render(report) == written
 
 
 def test_without_answers(demo):

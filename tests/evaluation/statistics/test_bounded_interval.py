@@ -177,3 +177,13 @@ def test_bad_input(method):
         bounded_interval([1, 2], low=1, high=5, method="t")
     with pytest.raises(DataError, match="no column x"):
         bounded_table(pd.DataFrame({"c": [1]}), score="x", by=["c"], low=1, high=5, method=method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_scale_beyond_all_squares_is_refused(method):
+    with pytest.raises(DataError, match="the scale: a value exceeds 1e"):
+        bounded_interval([5.0], low=0, high=1e300, method=method)
+
+
+def test_the_bootstrap_does_not_leave_the_scale_by_rounding():
+    assert bounded_interval([1, 1, 3], low=1, high=5, method="bootstrap", confidence=0.5).ci[0] == 1

@@ -80,7 +80,9 @@ class TestRangeCounts:
         found = range_counts([[1, 2, 3, 4, 5], [1, 1, 1, 1, 1]])
         assert found.flags == (
             "2 of 2 presentations have fewer than 6 raters, among whom no score can be out of range.",
+            "5 of 5 raters have no scores out of range, so no asymmetry of these.",
         )
+        assert bt500_rejection([[1, 2, 3, 4, 5], [1, 1, 1, 1, 1]]).flags == found.flags[:1]
         assert found.apa() == "0 of 10 scores by 5 raters are out of the range of their presentation"
         assert found.to_frame()["presentations"].tolist() == [2] * 5
 
@@ -122,3 +124,10 @@ class TestRejection:
     def test_nothing_at_all(self):
         with pytest.raises(InsufficientDataError, match="no scores"):
             bt500_rejection(np.full((3, 3), np.nan))
+
+
+@pytest.mark.parametrize("ratings", [np.full((3, 4), np.nan), np.empty((0, 4))])
+def test_raters_without_scores_are_flagged(ratings):
+    found = range_counts(ratings)
+    assert np.isnan(found.share).all()
+    assert found.flags == ("4 of 4 raters have no scores, so no share of them.",)

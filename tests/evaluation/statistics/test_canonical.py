@@ -308,3 +308,18 @@ def test_bad_input():
         canonical_correlation(np.empty((0, 2)), np.empty((0, 2)))
     with pytest.raises(InsufficientDataError, match="0 columns"):
         canonical_correlation(np.empty((5, 0)), y[:5])
+
+
+def test_columns_that_are_rounding_beside_their_common_part():
+    x = 1e15 + np.array([[2.5, 0.25], [-0.375, -2.25], [0.75, -1.75], [-3.125, 0.75]])
+    y = 1e15 + np.array([[-4.25], [-4.25], [-3.125], [1.125]])
+    with pytest.raises(InsufficientDataError, match="hardly more than the rounding"):
+        canonical_correlation(x, y)
+
+
+def test_a_perfect_correlation_is_flagged_once():
+    found = canonical_correlation([[5.0], [4], [3]], [[5.0], [4], [3]])
+    assert found.correlations == (1.0,) and math.isinf(found.sequence[0].F)
+    assert (
+        found.flags == found.sequence[0].flags == ("A canonical correlation is 1 to rounding, so that F has no bound.",)
+    )

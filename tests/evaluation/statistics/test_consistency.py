@@ -118,7 +118,7 @@ def test_bad_input():
         rater_consistency([1, 2], raters=["x"], items=["a", "a"])
     with pytest.raises(DataError, match="infinite"):
         rater_consistency([1, math.inf], raters=["x", "x"], items=["a", "a"])
-    with pytest.raises(DataError, match="raters: the one at place 1 is missing"):
+    with pytest.raises(DataError, match="raters: the label at place 1 is missing"):
         rater_consistency([1, 2], raters=["x", None], items=["a", "a"])
     with pytest.raises(DataError, match="between 0 and 1"):
         rater_consistency([1, 2], raters=["x", "x"], items=["a", "a"], confidence=0)

@@ -110,7 +110,7 @@ def test_categories_that_have_no_order_keep_that_of_their_appearance():
 def test_bad_input():
     with pytest.raises(DataError, match="3 row and 2 column categories"):
         contingency([1, 2, 3], ["a", "b"])
-    with pytest.raises(DataError, match="columns: the category at place 1 is missing"):
+    with pytest.raises(DataError, match="columns: the label at place 1 is missing"):
         contingency([1, 2, 3], ["a", None, "b"])
     with pytest.raises(DataError, match="whole numbers of 0 or more"):
         contingency_of_counts([[1, 2], [3, -4]])

@@ -138,3 +138,15 @@ def test_what_has_no_effect_size_is_refused():
         cohens_d_paired(ONE, TWO, standardiser="pooled")
     with pytest.raises(DataError, match="confidence"):
         cliffs_delta(ONE, TWO, confidence=0)
+
+
+def test_few_pairs_with_a_large_t():
+    found = hedges_g([1.4118348, 1.2817177, 0.3470825], [2.9425146, 2.9533112, 1.9017858], paired=True)
+    assert found.ci[0] < found.value < found.ci[1] < 0
+
+
+@pytest.mark.parametrize("standardiser", ["difference", "average"])
+def test_tiny_units_change_nothing(standardiser):
+    plain = cohens_d_paired([5, 4, 1], [3, 4, 2], standardiser=standardiser)
+    tiny = cohens_d_paired([5e-300, 4e-300, 1e-300], [3e-300, 4e-300, 2e-300], standardiser=standardiser)
+    assert (tiny.value, *tiny.ci) == pytest.approx((plain.value, *plain.ci))

@@ -105,3 +105,9 @@ def test_what_cannot_be_tested_is_refused():
         tost_one_sample([1, 2], bounds=1, alpha=0.5)
     with pytest.raises(DataError, match="pairs"):
         tost_paired([1], [1, 2], bounds=1)
+
+
+def test_tiny_units_change_nothing():
+    plain = tost_paired([5, 4, 1], [3, 4, 2], bounds=1)
+    tiny = tost_paired([5e-300, 4e-300, 1e-300], [3e-300, 4e-300, 2e-300], bounds=1e-300)
+    assert (tiny.t, tiny.p_lower, tiny.p_upper) == pytest.approx((plain.t, plain.p_lower, plain.p_upper))

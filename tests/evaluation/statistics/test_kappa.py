@@ -265,3 +265,7 @@ class TestLight:
             light_kappa([["a", "a"], ["a", "a"]])
         with pytest.raises(InsufficientDataError, match="No two raters"):
             light_kappa([["a"], ["b"]])
+
+
+def test_each_rater_agrees_with_himself():
+    assert np.diag(light_kappa([["a", "a"], ["b", "b"], ["a", "b"]]).matrix).tolist() == [1, 1]

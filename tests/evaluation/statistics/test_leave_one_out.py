@@ -87,3 +87,9 @@ class TestLeaveOneOut:
     def test_bad_confidence(self):
         with pytest.raises(DataError, match="between 0 and 1"):
             leave_one_out([[1, 2]], confidence=95)
+
+
+def test_three_items_give_no_interval():
+    found = leave_one_out([[5, 4], [3, 2], [2, 1.5]])
+    assert np.isfinite(found.r).all() and np.isnan(found.ci_low).all()
+    assert found.flags == ("2 of 2 raters have no interval: that needs four shared items.",)

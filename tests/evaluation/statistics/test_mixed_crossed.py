@@ -161,7 +161,7 @@ def test_many_ratings_with_gaps():
         (InsufficientDataError, "cannot tell", {"stimuli": list("abcdef") * 8, "raters": list("uvwxyz") * 8}),
         (DataError, "1 of 48 values are missing or infinite", {"values": [math.nan, *[1, 2, 3] * 15, 1, 2]}),
         (DataError, "conditions: there are 2 labels for 48", {"conditions": ["a", "b"]}),
-        (DataError, "raters: 1 labels are missing", {"raters": [None, *["a", "b"] * 23, "a"]}),
+        (DataError, "raters: the label at place 0 is missing", {"raters": [None, *["a", "b"] * 23, "a"]}),
         (DataError, "There is no condition z to refer to; there are 0, 1", {"reference": "z"}),
     ],
 )
@@ -187,3 +187,11 @@ def test_any_design_gives_finite_numbers_or_an_error(seed, n, slopes, method, le
     assert all(0 <= one.p <= one.p_holm <= 1 for one in found.contrasts)
     assert found.singular == any(flag.startswith("The fit is singular") for flag in found.flags)
     assert found.singular == any(one.sd == 0 for one in found.random)
+
+
+def test_values_whose_squares_vanish_are_refused():
+    labels = ["a", "b"] * 6, [1, 1, 2, 2, 3, 3] * 2, [*[1] * 6, *[2] * 6]
+    with pytest.raises(DataError, match="values: no value exceeds 1e-140"):
+        crossed_mixed_model(np.arange(12) ** 2 % 7 * 1e-300, *labels)
+    small, plain = (crossed_mixed_model(np.arange(12) ** 2 % 7 * unit, *labels).condition for unit in (1e-138, 1.0))
+    assert pytest.approx(plain.F) == small.F

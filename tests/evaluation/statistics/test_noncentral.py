@@ -49,3 +49,26 @@ def test_samples_of_the_ratio_agree():
 def test_a_level_lies_between_0_and_1(alpha):
     with pytest.raises(DataError, match="alpha is"):
         f_power(2, 10, 1, alpha=alpha)
+
+
+@pytest.mark.parametrize(
+    ("value", "df", "noncentrality", "expected"),
+    [
+        # Where scipy's nctdtr has no number, or a few digits; by a sum over a million values of log s.
+        (12, 1, 8.4, 0.5145613775698),
+        (12, 1, 24, 0.95374857320817),
+        (100, 2, 70, 0.38737483694676),
+        (999, 2, 999, 0.63212019021318),
+        (316, 3, 411, 0.83360208756026),
+        (999, 1, 1299, 0.80650171162914),
+        (10, 2, -10, 1.4521266695625e-27),
+    ],
+)
+def test_the_noncentral_t_where_values_are_large(value, df, noncentrality, expected):
+    assert t_exceeds(value, df, noncentrality) == pytest.approx(expected, abs=1e-11)
+
+
+@pytest.mark.parametrize("level", [0.3, 1e-12, 1e-30, 1e-100])
+@pytest.mark.parametrize("df", [1, 2, 60, 1e6])
+def test_the_far_tail_keeps_its_digits(df, level):
+    assert t_exceeds(float(stats.t.isf(level, df)), df, 0.0) == pytest.approx(level, rel=1e-8)

@@ -38,7 +38,7 @@ def test_the_table_of_the_paper(case):
     # The three slopes are from .67 to .76; together they are surely not 1.
     assert found.common_slope == pytest.approx(0.74, abs=0.005)
     assert len(found.flags) == 1
-    assert "All dimensions together: the slope of 0.74 shows a difference of scale" in found.flags[0]
+    assert "All dimensions together: the slope of 0.74 differs from 1" in found.flags[0]
     assert found.apa().startswith("P: bias -0.05, 95% CI [-0.15, 0.05], RMSE = 0.17, MAE = 0.14, slope 0.75, 95% CI")
     frame = found.to_frame()
     assert frame["dimension"].tolist() == ["P", "A", "D"]

@@ -229,3 +229,10 @@ def test_bad_input():
         mean_pairwise_pearson([1, 2, 3])
     with pytest.raises(DataError, match="not all numbers"):
         mean_pairwise_pearson([["a", "b"], ["c", "d"], ["e", "f"]])
+
+
+@pytest.mark.parametrize("ratings", [[[5, 4], [3, 2], [2, 1.0]], [[0, 1, 5], [0.1, 1.1, 5.1], [0.7, 1.7, 5.7]]])
+def test_perfect_agreement_has_no_bounded_f(ratings):
+    found = mean_pairwise_pearson(ratings)
+    assert (math.isinf(found.F), found.p) == (True, 0)
+    assert found.flags == ("All raters agree perfectly but for level and scale, so F has no bound.",)

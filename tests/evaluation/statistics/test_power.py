@@ -204,3 +204,13 @@ def test_bad_input(call, message):
         call()
     with pytest.raises(InsufficientDataError, match="two means"):
         effect_f([1], 1)
+
+
+@pytest.mark.parametrize("n", [2, 3, 4, 11])
+def test_a_level_that_is_next_to_nothing(n):
+    assert 0 <= paired_t_power(0.5, n, alpha=1e-300, alternative="greater").power < 1e-200
+
+
+def test_a_correlation_has_no_noncentrality():
+    found = correlation_power(0.3, 20)
+    assert found.noncentrality is None and math.isnan(found.to_frame()["noncentrality"][0])

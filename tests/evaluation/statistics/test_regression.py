@@ -191,3 +191,28 @@ def test_bad_data_give_an_error_or_a_flag(X, y):
             continue
         assert np.isfinite(found.estimates).all() and np.isfinite(found.se).all()
         assert np.isfinite(found.t).all() or found.flags
+
+
+@pytest.mark.parametrize(("x", "y", "name"), [(1, 1e-300, "y"), (1e-300, 1, "x"), (1e-160, 1e-160, "x")])
+def test_values_whose_squares_vanish_are_refused(x, y, name):
+    with pytest.raises(DataError, match=f"{name}: no value exceeds 1e-140"):
+        simple_regression(np.array([5, 4, 3, 1.0]) * x, np.array([4, 2, 3, 1.0]) * y)
+
+
+def test_standard_errors_of_very_different_units():
+    x, y = np.array([5, 4, 3, 1.0]), np.array([4, 2, 3, 1.0])
+    assert simple_regression(x * 1e130, y * 1e-130).t == pytest.approx(simple_regression(x, y).t)
+
+
+@pytest.mark.parametrize("start", [[1.2, 0.3, 5.6, 5.5, 6.5, 7.6], [0.0951, 1, 0.8607, 3, 1.5576, 5]])
+def test_residuals_near_rounding(start):
+    # NIST's Lanczos1, whose y are the model's with 13 digits; certified values.
+    def model(x, *b):
+        return b[0] * np.exp(-b[1] * x) + b[2] * np.exp(-b[3] * x) + b[4] * np.exp(-b[5] * x)
+
+    x = np.arange(24) / 20
+    y = [float(f"{value:.12e}") for value in model(x, 0.0951, 1, 0.8607, 3, 1.5576, 5)]
+    found = nonlinear_fit(model, x, y, start)
+    assert found.estimates == pytest.approx([0.0951, 1, 0.8607, 3, 1.5576, 5], rel=1e-8)
+    assert (found.rss, found.se[0]) == pytest.approx((1.4307867721e-25, 5.3347304234e-11), rel=0.01)
+    assert found.flags == ("The residuals are so small that rounding costs the standard errors digits.",)

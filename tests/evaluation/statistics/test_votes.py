@@ -82,3 +82,9 @@ def test_bad_counts():
         votes_of_counts(["a", "a"], [1, 1])
     with pytest.raises(InsufficientDataError, match="no votes"):
         votes_of_counts(["a", "b"], [0, 0])
+
+
+@pytest.mark.parametrize("count", ["5.0", None, math.nan, 1j])
+def test_counts_that_are_no_numbers(count):
+    with pytest.raises(DataError, match="a has"):
+        votes_of_counts(["a"], [count])

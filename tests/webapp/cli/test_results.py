@@ -34,14 +34,15 @@ def test_each_part_has_its_report_and_its_file(run: object, fails: object, rich:
         "Everything: words (rich, part words)",
     ]
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "report-faces.html",
-        "report-pairs.html",
-        "report-words.html",
+        *("faces", "pairs", "papers.html"),
+        *("report-faces.html", "report-pairs.html", "report-words.html", "words"),
     ]
+    assert (tmp_path / "out" / "faces" / "tables" / "overview.csv").is_file()
+    assert 'href="faces/tables/overview.csv"' in (tmp_path / "out" / "report-faces.html").read_text(encoding="utf-8")
     one = run("report", "rich", "--part", "pairs", "--out", str(tmp_path / "one")).output
     assert "Preferences between the conditions" in one
     assert "Single faces" not in one
-    assert (tmp_path / "one" / "report.html").is_file()
+    assert (tmp_path / "one" / "report-pairs.html").is_file()
     fails(run("report", "rich", "--part", "nosuch"), "no part 'nosuch'", "faces, pairs, words")
 
 

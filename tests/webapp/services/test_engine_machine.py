@@ -277,7 +277,7 @@ def test_no_answer_is_lost_doubled_or_leaked(lab: Lab) -> None:
             lab.database.engine, "checkout", lambda connection, *_: connection.execute("PRAGMA synchronous=OFF")
         )
     # PostgreSQL takes longer for each step.
-    usual = 30 if lab.database.engine.dialect.name == "sqlite" else 8
+    usual = 15 if lab.database.engine.dialect.name == "sqlite" else 5
     run_state_machine_as_test(
         lambda: Machine(lab),
         settings=settings(

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from annotating import apply_annotation
 from sqlalchemy import select, update
 
 from evaluation.instruments import get
 from evaluation.responses import check_responses, score_trials
 from evaluation.study import StudySpec
+from lab import Lab, always
 from webapp.config import Settings
 from webapp.db import Database
 from webapp.errors import NotFoundError
@@ -226,3 +228,32 @@ def test_a_study_without_answers(database: Database, mini: str) -> None:
     assert report.used is None
     assert report.notes == ("There are no answers yet.",)
     assert np.isnan(report.scores["P"]).all()
+
+
+def test_a_changed_answer_replaces_the_one_before(lab: Lab) -> None:
+    lab.apply()
+    rater = lab.rater()
+    for value in (1, 2):
+        rater.answer(always(value))
+    rater.send(1, rater.form(1, always(3)))
+    table = lab.see(lambda session: results.answers(session, "mini"))
+    assert not table.duplicated(["trial", "instrument", "item"]).any()
+    # In the order of the trials, whenever they were answered.
+    assert table.groupby("trial", sort=False)["raw"].agg(set).to_dict() == {1: {3}, 2: {2}}
+    assert len(rater.responses()) == 6
+
+
+def test_of_a_discussion_the_last_word_counts(lab: Lab) -> None:
+    apply_annotation(lab, mode="consensus", raters=2, agree=2, sets=1)
+    panel = [lab.rater(), lab.rater()]
+    for value, rater in enumerate(panel):
+        rater.answer_all(always(value), most=4)
+    for rater in panel:
+        rater.come_back()
+        rater.answer_all(always(2))
+    every = lab.see(lambda session: results.answers(session, "mini"))
+    counting = lab.see(lambda session: results.responses(session, "mini", "rate"))
+    assert set(every.loc[every["instrument"] == "pad5", "raw"]) == {0, 1, 2}
+    assert not counting.duplicated(["participant", "stimulus", "condition", "item"]).any()
+    assert (len(counting), set(counting["raw"])) == (2 * 4 * 3, {2})
+    assert lab.see(lambda session: results.report(session, "mini")).responses == 2 * 4
