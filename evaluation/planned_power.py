@@ -12,11 +12,11 @@ from evaluation.errors import DataError
 from evaluation.planning import SEEING, Plan
 from evaluation.statistics import wording
 from evaluation.statistics.arrays import FloatArray
-from evaluation.statistics.crossed_design import TEST_LABELS, TESTS, VarianceComponents
-from evaluation.statistics.crossed_power import CrossedPower, crossed_power, power_table, required
-from evaluation.statistics.effect_presets import CorrelationEffect, MeanEffect
-from evaluation.statistics.power import chance, correlation_power, required_n
-from evaluation.statistics.power_simulation import Share, SimulatedPower, simulate_correlation_power, simulate_power
+from evaluation.statistics.power.closed_form import chance, correlation_power, required_n
+from evaluation.statistics.power.crossed import CrossedPower, crossed_power, power_table, required
+from evaluation.statistics.power.crossed_design import TEST_LABELS, TESTS, VarianceComponents
+from evaluation.statistics.power.presets import CorrelationEffect, MeanEffect
+from evaluation.statistics.power.simulation import Share, SimulatedPower, simulate_correlation_power, simulate_power
 from evaluation.statistics.result import Result
 
 SCALE = (1, 5)
@@ -273,7 +273,7 @@ def comparison_power(
     Returns
     -------
     ComparisonPower
-        All tests of `evaluation.statistics.crossed_design.TESTS`; ratings are simulated on the five-point scale.
+        All tests of `evaluation.statistics.power.crossed_design.TESTS`; ratings are simulated on the five-point scale.
 
     Raises
     ------

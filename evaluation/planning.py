@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from evaluation.errors import DataError
 from evaluation.responses import input_pad, pad_instruments
-from evaluation.statistics.crossed_design import Assignment, CrossedDesign
+from evaluation.statistics.power.crossed_design import Assignment, CrossedDesign
 from evaluation.study import Part, StudySpec
 from evaluation.study_parts import Presentation
 

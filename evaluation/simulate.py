@@ -17,7 +17,7 @@ from evaluation.known_answers import accepted
 from evaluation.responses import DIMENSIONS, OPTIONAL_COLUMNS, RESPONSE_COLUMNS, input_pad, statistical
 from evaluation.seeding import bit_generator, generator
 from evaluation.simulated_answers import PERCEPTION_SD, RATER_SD, answer_instrument, answer_mos5, answer_pad12
-from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
+from evaluation.statistics.agreement.annotation import AnnotationAgreement, annotation_agreement
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import finite_array
 from evaluation.study import Cell, Part, StudySpec

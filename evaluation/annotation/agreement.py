@@ -12,7 +12,7 @@ from scipy import special
 from evaluation.annotation.missing import array_with_gaps, known_deviation
 from evaluation.errors import DataError
 from evaluation.statistics import wording
-from evaluation.statistics.agreement import annotation_agreement
+from evaluation.statistics.agreement.annotation import annotation_agreement
 from evaluation.statistics.arrays import FloatArray
 
 _FEWEST_SAMPLES = 3

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from evaluation.statistics.agreement import deviation
+from evaluation.statistics.agreement.annotation import deviation
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import finite_array
 
@@ -52,7 +52,7 @@ def known_deviation(ratings: npt.ArrayLike) -> FloatArray:
     -------
     numpy.ndarray, shape (samples, dimensions)
         Standard deviation with n - 1, exactly 0 where all agree; NaN where there are fewer than two ratings. For
-        complete ratings it is that of `evaluation.statistics.agreement.deviation`.
+        complete ratings it is that of `evaluation.statistics.agreement.annotation.deviation`.
 
     Raises
     ------

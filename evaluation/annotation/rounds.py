@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from evaluation.annotation.missing import array_with_gaps, known_deviation
 from evaluation.errors import DataError, InsufficientDataError
-from evaluation.statistics.agreement import deviation
+from evaluation.statistics.agreement.annotation import deviation
 from evaluation.statistics.arrays import FloatArray, finite_vector
 from evaluation.statistics.matrices import finite_array
 

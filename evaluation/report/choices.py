@@ -12,9 +12,9 @@ from evaluation.report.ratings import Unavailable
 from evaluation.report.section import Section
 from evaluation.responses import asked_about_clips, several, statistical
 from evaluation.seeding import generator
+from evaluation.statistics.agreement.fleiss import fleiss_kappa
+from evaluation.statistics.agreement.krippendorff import krippendorff_alpha
 from evaluation.statistics.arrays import FloatArray
-from evaluation.statistics.fleiss_kappa import fleiss_kappa
-from evaluation.statistics.krippendorff import krippendorff_alpha
 from evaluation.statistics.result import Result
 
 _SOURCES = (

@@ -9,8 +9,8 @@ from evaluation.report.pairs import pairs_of_conditions
 from evaluation.report.score_table import score_tables
 from evaluation.report.section import Section, label
 from evaluation.statistics import wording
-from evaluation.statistics.mixed_result import CrossedMixedModel
-from evaluation.statistics.ordinal_crossed import CrossedCumulativeLogit
+from evaluation.statistics.mixed.result import CrossedMixedModel
+from evaluation.statistics.ordinal.crossed import CrossedCumulativeLogit
 
 WHY_UNITS_DIFFER = (
     "Units: Jia et al. (2013), Table 10, take the mean of each stimulus in each condition as a value of independent "

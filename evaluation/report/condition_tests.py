@@ -16,9 +16,9 @@ from evaluation.statistics.anova import one_way
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.assumptions import levene, shapiro_residuals
 from evaluation.statistics.min_f import min_f
-from evaluation.statistics.mixed import crossed_mixed_model
-from evaluation.statistics.mixed_result import CrossedMixedModel
-from evaluation.statistics.ordinal_crossed import CrossedCumulativeLogit, crossed_cumulative_logit
+from evaluation.statistics.mixed.models import crossed_mixed_model
+from evaluation.statistics.mixed.result import CrossedMixedModel
+from evaluation.statistics.ordinal.crossed import CrossedCumulativeLogit, crossed_cumulative_logit
 from evaluation.statistics.rank_tests import friedman, kruskal_wallis
 from evaluation.statistics.repeated_measures import RepeatedMeasuresAnova, repeated_measures
 from evaluation.statistics.result import Result
@@ -160,7 +160,7 @@ class Comparison:
         if len(self.table) > ORDINAL_RATINGS:
             raise InsufficientDataError(
                 f"Not fitted: it takes long for the {len(self.table)} ratings, more than {ORDINAL_RATINGS}; "
-                "evaluation.statistics.ordinal_crossed fits it."
+                "evaluation.statistics.ordinal.crossed fits it."
             )
         values = self.table["value"].to_numpy(dtype=float)
         if (values == np.rint(values)).all():

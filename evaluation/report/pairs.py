@@ -17,7 +17,7 @@ from evaluation.statistics import wording
 from evaluation.statistics.comparisons import Comparisons
 from evaluation.statistics.effect_size import cliffs_delta, cohens_d_paired, hedges_g
 from evaluation.statistics.equivalence import tost_paired
-from evaluation.statistics.mixed_result import CrossedMixedModel
+from evaluation.statistics.mixed.result import CrossedMixedModel
 from evaluation.statistics.posthoc import games_howell, paired_comparisons, tukey_hsd
 from evaluation.statistics.result import Result
 

@@ -12,9 +12,9 @@ from evaluation.report.printed_check import Check, check_block, nearest_count, p
 from evaluation.statistics import wording
 from evaluation.statistics.anova import OneWayAnova, one_way_from_summary, pooled_sd_from_f
 from evaluation.statistics.correlation import pearson
-from evaluation.statistics.effect_presets import PRESETS, MeanEffect
+from evaluation.statistics.power.presets import PRESETS, MeanEffect
 from evaluation.statistics.printed_tables import MTAP, figures, table
-from evaluation.statistics.scale_reliability import spearman_brown
+from evaluation.statistics.scale_reliability.alpha import spearman_brown
 
 _PAPER = "MTAP 2013"
 _AXES = {"P": "Pleasure", "A": "Arousal", "D": "Dominance"}

@@ -15,10 +15,10 @@ from evaluation.report.score_table import ScoreTable, score_tables
 from evaluation.report.section import NOTHING, Section, label
 from evaluation.seeding import generator
 from evaluation.statistics import wording
+from evaluation.statistics.agreement.icc import IntraclassCorrelations, intraclass_correlations
+from evaluation.statistics.agreement.krippendorff import KrippendorffAlpha, Level, krippendorff_alpha
+from evaluation.statistics.agreement.pairwise import MeanPairwiseCorrelation, mean_pairwise_pearson
 from evaluation.statistics.consistency import RaterConsistency, rater_consistency
-from evaluation.statistics.icc import IntraclassCorrelations, intraclass_correlations
-from evaluation.statistics.krippendorff import KrippendorffAlpha, Level, krippendorff_alpha
-from evaluation.statistics.pairwise import MeanPairwiseCorrelation, mean_pairwise_pearson
 from evaluation.statistics.result import Result
 
 _SOURCES = (

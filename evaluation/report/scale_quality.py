@@ -13,7 +13,7 @@ from evaluation.report.section import NOTHING, Section
 from evaluation.responses import KEY
 from evaluation.seeding import generator
 from evaluation.statistics import wording
-from evaluation.statistics.pad_scale_quality import DimensionQuality, pad_scale_quality
+from evaluation.statistics.scale_reliability.pad import DimensionQuality, pad_scale_quality
 
 REPLICATES, FEWER_REPLICATES = 1_000, 200
 MANY_ROWS = 5_000

@@ -5,9 +5,9 @@ import pytest
 from evaluation.errors import DataError
 from evaluation.planned_power import comparison_power, correlation_plan, effect_means, told_design
 from evaluation.planning import plan_comparison
-from evaluation.statistics.crossed_design import TESTS
-from evaluation.statistics.crossed_power import crossed_power
-from evaluation.statistics.effect_presets import preset, usual_components
+from evaluation.statistics.power.crossed import crossed_power
+from evaluation.statistics.power.crossed_design import TESTS
+from evaluation.statistics.power.presets import preset, usual_components
 from evaluation.study import load_bundled
 
 DEMO = plan_comparison(load_bundled("demo"), "main", raters=30)

@@ -19,7 +19,7 @@ from evaluation.simulate import (
     simulate_responses,
     simulate_trials,
 )
-from evaluation.statistics.agreement import annotation_agreement
+from evaluation.statistics.agreement.annotation import annotation_agreement
 from evaluation.study import StudySpec
 
 

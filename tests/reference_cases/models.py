@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from evaluation.statistics.mixed import RandomTerm, compare, mixed_model
-from evaluation.statistics.mixed_result import MixedModel
-from evaluation.statistics.nonlinear_regression import nonlinear_fit
-from evaluation.statistics.ordinal import cumulative_logit
-from evaluation.statistics.ordinal_mixed import cumulative_logit_mixed
-from evaluation.statistics.regression import linear_fit, simple_regression
+from evaluation.statistics.mixed.models import RandomTerm, compare, mixed_model
+from evaluation.statistics.mixed.result import MixedModel
+from evaluation.statistics.ordinal.fixed import cumulative_logit
+from evaluation.statistics.ordinal.mixed import cumulative_logit_mixed
+from evaluation.statistics.regression.linear import linear_fit, simple_regression
+from evaluation.statistics.regression.nonlinear import nonlinear_fit
 from reference_cases.cases import Case, Each
 from reference_cases.formulas import Formula, RandomPart, design, expression, formula
 

@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from evaluation.statistics.agreement.fleiss import fleiss_kappa, fleiss_kappa_of_labels
+from evaluation.statistics.agreement.icc import intraclass_correlations
+from evaluation.statistics.agreement.kappa import cohen_kappa
+from evaluation.statistics.agreement.krippendorff import krippendorff_alpha
 from evaluation.statistics.canonical import canonical_correlation
 from evaluation.statistics.correlation import pearson
-from evaluation.statistics.fleiss_kappa import fleiss_kappa, fleiss_kappa_of_labels
-from evaluation.statistics.icc import intraclass_correlations
-from evaluation.statistics.kappa import cohen_kappa
-from evaluation.statistics.krippendorff import krippendorff_alpha
-from evaluation.statistics.omega import mcdonald_omega
 from evaluation.statistics.opinion import opinion_score
 from evaluation.statistics.rank_correlation import kendall, spearman
 from evaluation.statistics.rater_model import rater_model
-from evaluation.statistics.scale_reliability import cronbach_alpha
+from evaluation.statistics.scale_reliability.alpha import cronbach_alpha
+from evaluation.statistics.scale_reliability.omega import mcdonald_omega
 from reference_cases.cases import Case
 
 

@@ -21,12 +21,12 @@ import yaml
 from numpy.typing import NDArray
 from scipy import stats
 
+from evaluation.statistics.agreement.icc import intraclass_correlations
+from evaluation.statistics.agreement.krippendorff import krippendorff_alpha
+from evaluation.statistics.agreement.pairwise import mean_pairwise_pearson
 from evaluation.statistics.anova import one_way_of_matrix
-from evaluation.statistics.icc import intraclass_correlations
-from evaluation.statistics.krippendorff import krippendorff_alpha
-from evaluation.statistics.mixed import crossed_mixed_model
-from evaluation.statistics.mixed_result import CrossedMixedModel
-from evaluation.statistics.pairwise import mean_pairwise_pearson
+from evaluation.statistics.mixed.models import crossed_mixed_model
+from evaluation.statistics.mixed.result import CrossedMixedModel
 from evaluation.statistics.rater_model import rater_model
 from evaluation.study import StudySpec
 from webapp.cli.bench_database import filled

@@ -17,8 +17,9 @@ from evaluation.planned_power import (
 )
 from evaluation.planning import comparable_parts, correlated_parts, plan_comparison, planned_pairs
 from evaluation.statistics import wording
-from evaluation.statistics.crossed_design import TEST_LABELS, VarianceComponents
-from evaluation.statistics.effect_presets import (
+from evaluation.statistics.power.closed_form import chance
+from evaluation.statistics.power.crossed_design import TEST_LABELS, VarianceComponents
+from evaluation.statistics.power.presets import (
     PRESETS,
     CorrelationEffect,
     Effect,
@@ -26,7 +27,6 @@ from evaluation.statistics.effect_presets import (
     preset,
     usual_components,
 )
-from evaluation.statistics.power import chance
 from evaluation.study import StudySpec
 from webapp.cli.context import echo_json
 from webapp.cli.study import FILE, read_study_file

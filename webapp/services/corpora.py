@@ -16,7 +16,7 @@ from evaluation.errors import EvaluationError
 from evaluation.responses import DIMENSIONS, check_responses, pad_instruments, score_trials
 from evaluation.seeding import generator
 from evaluation.simulate import annotate_incrementally
-from evaluation.statistics.agreement import AnnotationAgreement, annotation_agreement
+from evaluation.statistics.agreement.annotation import AnnotationAgreement, annotation_agreement
 from evaluation.study import Part, StudySpec
 from synth.clip import clip_digest
 from synth.clip_spec import ClipSpec

@@ -9,7 +9,7 @@ from scipy import stats
 from evaluation.annotation.agreement import round_agreement
 from evaluation.annotation.missing import array_with_gaps, known_deviation
 from evaluation.errors import DataError
-from evaluation.statistics.agreement import annotation_agreement, deviation
+from evaluation.statistics.agreement.annotation import annotation_agreement, deviation
 
 seeds = st.integers(0, 2**32)
 NOTHING = math.nan

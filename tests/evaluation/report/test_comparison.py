@@ -23,8 +23,8 @@ from evaluation.report.condition_tests import (
 from evaluation.report.full import FullReport
 from evaluation.report.score_table import score_tables
 from evaluation.simulate import simulate_responses
-from evaluation.statistics.mixed import crossed_mixed_model
-from evaluation.statistics.ordinal_crossed import crossed_cumulative_logit
+from evaluation.statistics.mixed.models import crossed_mixed_model
+from evaluation.statistics.ordinal.crossed import crossed_cumulative_logit
 
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")
 

@@ -8,7 +8,7 @@ import pytest
 
 from evaluation.responses import check_responses, score_trials
 from evaluation.simulate import simulate_responses
-from evaluation.statistics.agreement import annotation_agreement
+from evaluation.statistics.agreement.annotation import annotation_agreement
 from evaluation.study import StudySpec
 from synth.corpus.landmarks import read_set, write_set
 from synth.errors import SpecError

@@ -136,6 +136,8 @@ class Kept:
     def __init__(self, rows: int) -> None:
         self.report = self
         self.scores = range(rows)
+        self.answers = range(0)
+        self.used = None
 
 
 def maker(rows: int, made: list[int]) -> Callable[[], FullReport]:
