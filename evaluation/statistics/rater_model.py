@@ -201,38 +201,52 @@ def rater_model(
     experiments, Human Vision and Electronic Imaging (arXiv:2004.02067).
     """
     check_confidence(confidence)
+    begun = _of_complete(ratings)
+    if begun is not None:
+        return _fit(begun.rest, None, begun, tolerance=tolerance, steps=steps, confidence=confidence)
     scores, given = _table(ratings)
-    if given is None:
-        if len(scores) >= LEAST_RATINGS and scores.shape[1] > 1:
-            return _fit(scores, None, None, tolerance=tolerance, steps=steps, confidence=confidence)
-        scores, given = ratings_table(ratings)
     fitted = _linked(given)
     if not fitted.any():
         raise InsufficientDataError(
             f"Bias and inconsistency need two raters or more with at least {LEAST_RATINGS} items in common with others."
         )
-    return _fit(scores, given, fitted, tolerance=tolerance, steps=steps, confidence=confidence)
+    return _fit(scores, (given, fitted), None, tolerance=tolerance, steps=steps, confidence=confidence)
 
 
-def _table(ratings: npt.ArrayLike) -> tuple[FloatArray, BoolArray | None]:
-    """Return as `ratings_table`, but sooner, and None if nothing is missing."""
+def _plain(ratings: npt.ArrayLike) -> FloatArray | None:
+    """Return a table of numbers as it is, None if the ratings are anything else."""
     if not isinstance(ratings, np.ndarray) or ratings.dtype.kind not in "iuf" or ratings.ndim != 2:
-        return ratings_table(ratings)
-    scores, given = np.ascontiguousarray(ratings, dtype=float), None
-    # A sum is NaN if one of its terms is.
+        return None
+    return np.ascontiguousarray(ratings, dtype=float)
+
+
+def _of_complete(ratings: npt.ArrayLike) -> AlternatingProjection | None:
+    """Return the fit's beginning if nothing is missing; the sums that it needs tell that sooner than a look first."""
+    scores = _plain(ratings)
+    if scores is None or len(scores) < LEAST_RATINGS or scores.shape[1] < 2:
+        return None
     with np.errstate(all="ignore"):
-        sums = np.abs(scores @ np.ones(scores.shape[1]))
-        if not sums.max(initial=0) < _LARGEST:
-            given = ~np.isnan(scores)
-            scores = np.where(given, scores, 0)
-            sums = np.einsum("ji,ji->j", scores, scores)
+        begun = AlternatingProjection(scores, None)
+    # A sum is NaN if one of its terms is.
+    return begun if begun.largest < _LARGEST else None
+
+
+def _table(ratings: npt.ArrayLike) -> tuple[FloatArray, BoolArray]:
+    """Return as `ratings_table`, but sooner."""
+    scores = _plain(ratings)
+    if scores is None:
+        return ratings_table(ratings)
+    given = ~np.isnan(scores)
+    scores = np.where(given, scores, 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        sums = np.einsum("ji,ji->j", scores, scores)
     return (scores, given) if sums.max(initial=0) < _LARGEST else ratings_table(ratings)
 
 
 def _fit(
     scores: FloatArray,
-    given: BoolArray | None,
-    fitted: BoolArray | None,
+    known: tuple[BoolArray, BoolArray] | None,
+    begun: AlternatingProjection | None,
     *,
     tolerance: float,
     steps: int,
@@ -241,15 +255,13 @@ def _fit(
     shape = scores.shape
     items: BoolArray
     raters: BoolArray
-    if given is None or fitted is None:
+    given: BoolArray | None = None
+    if known is None or begun is not None:
         group, of_items = np.zeros(shape[1], dtype=np.intp), np.zeros(shape[0], dtype=np.intp)
         items, raters = np.ones(shape[0], dtype=np.bool_), np.ones(shape[1], dtype=np.bool_)
-        with np.errstate(over="ignore", invalid="ignore"):
-            fit = AlternatingProjection(scores, None)
-        if not fit.squares.max() < _LARGEST:
-            # Ratings that cancelled each other in the sums may still be too large.
-            ratings_table(scores)
+        fit = begun if begun is not None else AlternatingProjection(scores, None)
     else:
+        given, fitted = known
         group = _groups(fitted)
         of_items = group[fitted.argmax(axis=1)]
         items, raters = np.asarray(fitted.any(axis=1)), np.asarray(fitted.any(axis=0))

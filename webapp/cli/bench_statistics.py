@@ -38,6 +38,7 @@ MISSING = 0.3
 CONDITIONS = 3
 REPEATS = 7
 SLOW_REPEATS = 3
+FILLED = 0.02
 PEERS = ("krippendorff", "pingouin", "statsmodels", "sureal")
 
 Floats = NDArray[np.float64]
@@ -51,7 +52,7 @@ def statistics(as_json: bool, report: bool) -> None:
     """Measure the statistics beside scipy, numpy, pandas, krippendorff, pingouin, sureal and statsmodels.
 
     The peers come with the extra ``bench``. All are given the same 1,000 x 1,000 ratings in one run, and take turns;
-    each timed call follows one of its own that is not timed, so that both find their data and threads ready. A ratio is
+    each is timed after a call of its own that is not, short ones as the mean of the calls that 20 ms hold. A ratio is
     the median over pairs of the peer's time over ours. The mixed models of 3 x 40 x 40 and 3 x 100 x 100 ratings take
     statsmodels minutes, so the larger is fitted once. Last, the full report is written for a study of a million
     ratings in an SQLite database, in a process of its own.
@@ -163,11 +164,16 @@ def _compared(name: str, ours: Call, peer: Call, repeats: int) -> dict[str, floa
 
 
 def _seconds(work: Call, *, warm: bool = True) -> float:
+    """Return how long a call takes: of short ones the mean of as many as fill `FILLED` seconds, after one untimed."""
+    calls = 1
     if warm:
+        begun = time.perf_counter()
         work()
+        calls = max(1, round(FILLED / (time.perf_counter() - begun)))
     begun = time.perf_counter()
-    work()
-    return time.perf_counter() - begun
+    for _ in range(calls):
+        work()
+    return (time.perf_counter() - begun) / calls
 
 
 def _mixed(size: int, repeats: int) -> dict[str, float]:

@@ -11,6 +11,9 @@ from evaluation.errors import DataError, InsufficientDataError
 from evaluation.statistics.arrays import FloatArray
 from evaluation.statistics.matrices import centred_columns, constant_columns, finite_array
 
+# Squares of what is smaller, in units of the item that varies most, vanish.
+_SMALLEST = 1e-140
+
 
 class AnswerTable(NamedTuple):
     """Complete answers to items that vary.
@@ -115,6 +118,12 @@ def answer_table(
         listed = ", ".join(known[place] for place in constant)
         raise InsufficientDataError(f"Items with the same answer throughout must be left out first: {listed}.")
     unit = float(np.abs(differences).max())
+    lost = np.flatnonzero(np.abs(differences).max(axis=0) / unit < _SMALLEST)
+    if lost.size:
+        listed = ", ".join(known[place] for place in lost)
+        raise DataError(
+            f"Items that vary so much less than others cannot be reckoned with; use like units for {listed}."
+        )
     return AnswerTable(known, mean, differences / unit, unit, int((~complete).sum()))
 
 

@@ -238,4 +238,5 @@ def test_any_data_give_finite_numbers_or_an_error(rows, slopes):
     numbers = [found.sigma, found.loglik, *(value for one in found.fixed for value in (one.t, one.se, one.df, one.p))]
     assert np.isfinite([*numbers, *(one.sd for one in found.random)]).all()
     assert found.sigma > 0
-    assert found.converged
+    # Very few ratings may leave the search on a ridge, which the result says.
+    assert found.converged or any("did not converge" in flag for flag in found.flags)
