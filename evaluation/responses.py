@@ -1,9 +1,11 @@
 """Collected answers as a table: its columns, its checks, and the scores of each trial."""
 
 import math
+from collections.abc import Sequence
 from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 import pandas as pd
 
 from evaluation.errors import DataError
@@ -30,6 +32,8 @@ OPTIONAL_COLUMNS = MappingProxyType(
     }
 )
 """Columns that a table of responses may have besides."""
+
+Ints = npt.NDArray[np.int64]
 
 DIMENSIONS = ("P", "A", "D")
 INPUT_COLUMNS = tuple(f"input_{dimension}" for dimension in DIMENSIONS)
@@ -78,7 +82,18 @@ def check_responses(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
     _check_cells(spec, table)
     _check_answers(spec, complete(table))
     _check_once(complete(table))
+    if _in_order(table):
+        return table.reset_index(drop=True)
     return table.sort_values(["participant", "trial"], kind="stable", ignore_index=True)
+
+
+def _in_order(table: pd.DataFrame) -> bool:
+    """Tell whether whole numbers of participants, and their trials, come in order already."""
+    people, trials = table["participant"], table["trial"].to_numpy()
+    if not pd.api.types.is_integer_dtype(people.dtype):
+        return False
+    steps = np.diff(people.to_numpy())
+    return bool(((steps > 0) | ((steps == 0) & (np.diff(trials) >= 0))).all())
 
 
 def complete(responses: pd.DataFrame) -> pd.DataFrame:
@@ -158,29 +173,56 @@ def score_trials(spec: StudySpec, responses: pd.DataFrame) -> pd.DataFrame:
         keyed answers. NaN where an item that the score needs has no answer, or the clip names no PAD.
     """
     table = complete(responses)
-    trials = table.drop_duplicates(_KEY)[[*_KEY, "stimulus", "condition"]].reset_index(drop=True)
+    which, trials = alike(table, _KEY, keep=["stimulus", "condition"])
     nothing = (math.nan, math.nan, math.nan)
     pads = {cell: input_pad(spec, *cell) or nothing for cell in spec.cells()}
-    which, shown = pd.factorize(pd.MultiIndex.from_frame(trials[["stimulus", "condition"]]))
-    given = np.array([pads[Cell(*cell)] for cell in shown], dtype=float).reshape(-1, len(DIMENSIONS))
-    trials[list(INPUT_COLUMNS)] = given[which]
+    shown, cells = alike(trials, ["stimulus", "condition"])
+    given = np.array([pads[Cell(*cell)] for cell in cells.itertuples(index=False)], dtype=float)
+    given = given.reshape(-1, len(DIMENSIONS))
+    trials[list(INPUT_COLUMNS)] = given[shown]
     for instrument in asked_about_clips(spec):
-        numbers = _numbers(instrument, table[table["instrument"] == instrument.name])
-        numbers = numbers.reindex(pd.MultiIndex.from_frame(trials[_KEY]))
+        own = (table["instrument"] == instrument.name).to_numpy()
+        numbers = _numbers(instrument, table[own], which[own], len(trials))
         for name in numbers_of(instrument):
-            own = pd.Series(numbers[name].to_numpy(dtype=float), index=trials.index)
+            column = pd.Series(numbers[name].to_numpy(dtype=float), index=trials.index)
             # Two parts may each ask an instrument that has this score.
-            trials[name] = trials[name].fillna(own) if name in trials else own
+            trials[name] = trials[name].fillna(column) if name in trials else column
     return trials if "clip" in responses else trials.drop(columns="clip")
 
 
-def _numbers(instrument: Instrument, answered: pd.DataFrame) -> pd.DataFrame:
-    """Return the numbers of one instrument, one row for each clip of each trial."""
+def alike(frame: pd.DataFrame, columns: Sequence[str], *, keep: Sequence[str] = ()) -> tuple[Ints, pd.DataFrame]:
+    """Return which of the different rows each row of a frame is, and these, as far as some columns go.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Any frame; it may have millions of rows.
+    columns : sequence of str
+        Columns that tell rows apart.
+    keep : sequence of str
+        Columns that the different rows have besides, from the first of those that are alike.
+
+    Returns
+    -------
+    tuple of (numpy.ndarray of int, pandas.DataFrame)
+        A number for each row, and the different rows in the order in which they come first.
+    """
+    which = np.asarray(frame.groupby(list(columns), sort=False).ngroup(), dtype=np.int64)
+    _, first = np.unique(which, return_index=True)
+    return which, frame.iloc[first][[*columns, *keep]].reset_index(drop=True)
+
+
+def _numbers(instrument: Instrument, answered: pd.DataFrame, which: Ints, trials: int) -> pd.DataFrame:
+    """Return the numbers of one instrument, one row for each clip of each trial; `which` is that of each answer."""
     items = [item.id for item in instrument.items if item.numeric]
-    wide = answered.pivot(index=_KEY, columns="item", values="keyed").reindex(columns=items)
+    places = pd.Index(items).get_indexer(pd.Index(answered["item"]))
+    asked = places >= 0
+    wide = np.full((trials, len(items)), math.nan)
+    wide[which[asked], places[asked]] = answered["keyed"].to_numpy(dtype=float)[asked]
+    frame = pd.DataFrame(wide, columns=items)
     if instrument.scores:
-        return instrument.score_table(wide)
-    return wide.rename(columns={item: f"{instrument.name}.{item}" for item in items})
+        return instrument.score_table(frame)
+    return frame.rename(columns={item: f"{instrument.name}.{item}" for item in items})
 
 
 def _whole(values: pd.Series, column: str) -> pd.Series:

@@ -24,6 +24,7 @@ from evaluation.responses import (
     INPUT_COLUMNS,
     KEY,
     RESPONSE_COLUMNS,
+    alike,
     asked_about_clips,
     check_responses,
     complete,
@@ -376,8 +377,8 @@ def _incomplete(spec: StudySpec, table: pd.DataFrame) -> int:
         for item in statistical(one)
         if item.required
     }
-    which, asked = pd.factorize(pd.MultiIndex.from_frame(table[["instrument", "item"]]))
-    numbers = np.array([needed.get(key, np.nan) for key in asked], dtype=float)
+    which, asked = alike(table, ["instrument", "item"])
+    numbers = np.array([needed.get(key, np.nan) for key in asked.itertuples(index=False, name=None)], dtype=float)
     expected = pd.Series(numbers[which] if len(table) else numbers, index=table.index, dtype=float)
     answered = expected.dropna().groupby([table[column] for column in (*KEY, "instrument")]).agg(["size", "first"])
     return int((answered["size"] < answered["first"]).sum())

@@ -10,7 +10,7 @@ from evaluation.report.analysis import StudyReport
 from evaluation.report.block import Block, attempt, stacked
 from evaluation.report.ratings import Unavailable
 from evaluation.report.section import Section
-from evaluation.responses import asked_about_clips, several, statistical
+from evaluation.responses import alike, asked_about_clips, several, statistical
 from evaluation.seeding import generator
 from evaluation.statistics.agreement.fleiss import fleiss_kappa
 from evaluation.statistics.agreement.krippendorff import krippendorff_alpha
@@ -58,7 +58,7 @@ def choice_agreement(report: StudyReport) -> Block | None:
 def _chosen(report: StudyReport, instrument: str, item: str) -> FloatArray:
     """Return the values chosen, shape (clips, raters); NaN where there is none, the last where there are several."""
     own = report.answers[(report.answers["instrument"] == instrument) & (report.answers["item"] == item)]
-    clips, cells = pd.factorize(pd.MultiIndex.from_frame(own[["stimulus", "condition"]]))
+    clips, cells = alike(own, ["stimulus", "condition"])
     raters, people = pd.factorize(own["participant"])
     matrix = np.full((len(cells), len(people)), np.nan)
     matrix[clips, raters] = own["keyed"].to_numpy(dtype=float)

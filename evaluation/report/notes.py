@@ -8,8 +8,8 @@ from evaluation.study import StudySpec
 
 def people(table: pd.DataFrame, preferences: pd.DataFrame | None) -> int:
     """Return how many participants gave an answer."""
-    found = set(table["participant"])
-    return len(found if preferences is None else found | set(preferences["participant"]))
+    found = set(table["participant"].unique())
+    return len(found if preferences is None else found | set(preferences["participant"].unique()))
 
 
 def notes_on(

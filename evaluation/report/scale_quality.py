@@ -10,7 +10,7 @@ from evaluation.report.analysis import StudyReport
 from evaluation.report.block import Block, attempt
 from evaluation.report.ratings import Unavailable
 from evaluation.report.section import NOTHING, Section
-from evaluation.responses import KEY
+from evaluation.responses import KEY, alike
 from evaluation.seeding import generator
 from evaluation.statistics import wording
 from evaluation.statistics.scale_reliability.pad import DimensionQuality, pad_scale_quality
@@ -60,12 +60,11 @@ def scale_quality(report: StudyReport) -> Block | None:
 
 def _one_row_for_each_clip(answers: pd.DataFrame) -> pd.DataFrame:
     """Return keyed answers with a column for each item, and participant and stimulus."""
-    clips, keys = pd.factorize(pd.MultiIndex.from_frame(answers[list(KEY)]))
+    clips, first = alike(answers, KEY, keep=["stimulus"])
     items, names = pd.factorize(answers["item"])
-    wide = np.full((len(keys), len(names)), np.nan)
+    wide = np.full((len(first), len(names)), np.nan)
     wide[clips, items] = answers["keyed"].to_numpy(dtype=float)
-    first = answers.drop_duplicates(list(KEY))[["participant", "stimulus"]].reset_index(drop=True)
-    return pd.concat([first, pd.DataFrame(wide, columns=list(names))], axis=1)
+    return pd.concat([first[["participant", "stimulus"]], pd.DataFrame(wide, columns=list(names))], axis=1)
 
 
 def _rest(found: DimensionQuality) -> list[float]:

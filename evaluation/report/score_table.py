@@ -9,7 +9,7 @@ import pandas as pd
 from evaluation.instruments import ChoiceItem, Instrument, Item
 from evaluation.instruments.mos import MOS5
 from evaluation.report.analysis import StudyReport
-from evaluation.responses import asked_about_clips, numbers_of
+from evaluation.responses import alike, asked_about_clips, numbers_of
 from evaluation.statistics.arrays import FloatArray
 from evaluation.study import Cell
 
@@ -49,7 +49,7 @@ class ScoreTable:
 
     @cached_property
     def _coded(self) -> "_Coded":
-        clips, cells = pd.factorize(pd.MultiIndex.from_frame(self.table[["stimulus", "condition"]]))
+        clips, cells = alike(self.table, ["stimulus", "condition"])
         raters, people = pd.factorize(self.table["participant"])
         width = len(people)
         place, values = clips * width + raters, self.table["value"].to_numpy(dtype=float)
@@ -57,12 +57,21 @@ class ScoreTable:
         sums = np.bincount(place, weights=values, minlength=len(cells) * width)
         matrix = np.full(len(counts), np.nan)
         np.divide(sums, counts, out=matrix, where=counts > 0)
-        return _Coded(matrix.reshape(-1, width), [Cell(*cell) for cell in cells], list(people))
+        return _Coded(
+            matrix.reshape(-1, width), [Cell(*cell) for cell in cells.itertuples(index=False, name=None)], list(people)
+        )
 
     def of(self, condition: str) -> "ScoreTable":
         """Return the ratings of one condition."""
         own = self.table[self.table["condition"] == condition].reset_index(drop=True)
-        return replace(self, table=own, conditions=(condition,))
+        found = replace(self, table=own, conditions=(condition,))
+        rows = [place for place, cell in enumerate(self.clips) if cell.condition == condition]
+        matrix = self.matrix[rows]
+        rated = np.asarray(~np.isnan(matrix).all(axis=0))
+        raters = [rater for rater, has in zip(self.raters, rated, strict=True) if has]
+        # What is known of all conditions need not be found anew, which takes long for a million ratings.
+        found.__dict__["_coded"] = _Coded(matrix[:, rated], [self.clips[row] for row in rows], raters)
+        return found
 
     @property
     def matrix(self) -> FloatArray:

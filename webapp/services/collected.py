@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from sqlalchemy import Text, cast, select
+from sqlalchemy import Executable, Text, cast, select
 from sqlalchemy.orm import Session
 
 from evaluation.annotation.discussion import DISCUSSION
@@ -61,10 +61,16 @@ def as_frame(rows: pd.DataFrame) -> pd.DataFrame:
     return table.astype({column: object for column in table if isinstance(table[column].dtype, pd.CategoricalDtype)})
 
 
-def read(session: Session, study: Study) -> pd.DataFrame:
+def read(session: Session, study: Study, *, displayed: bool = True) -> pd.DataFrame:
     """Return all counting answers of a study, by participant and trial, in a form that stays small for millions.
 
     Pages that were answered alike are read once, and names are categories.
+
+    Parameters
+    ----------
+    displayed : bool
+        Whether to read how the page stood, too; without, `raw` is the keyed answer, nothing is `flipped`, and there is
+        no `place`.
 
     Returns
     -------
@@ -72,7 +78,7 @@ def read(session: Session, study: Study) -> pd.DataFrame:
         The columns `ANSWER_COLUMNS`, names as categories; then `shown`, the number of clips that the trial shows, and
         `conditions`, a tuple of their conditions in the order of the page.
     """
-    given = _read(session, study)
+    given = _read(session, study, displayed=displayed)
     counting = _counting(given)
     return _table(given, counting)
 
@@ -156,48 +162,59 @@ def _plain(answer: Any) -> Any:
     return tuple(answer) if isinstance(answer, list) else answer
 
 
-def _read(session: Session, study: Study) -> _Given:
+def _read(session: Session, study: Study, *, displayed: bool) -> _Given:
     """Read all answers, those with the same text, and trials that show the same, once."""
     spec, found = studies.spec_of(study), shows(session, study)
-    # Millions of rows pass here, so they come as plain tuples, and few at a time.
-    result = session.connection().execute(
+    texts = (Response.answers, Response.raw, Response.display) if displayed else (Response.answers,)
+    statement = (
         select(
             *(Response.id, Response.revision, Response.trial_id, Trial.position, Participant.number),
-            *(Response.instrument, *(cast(text, Text) for text in (Response.answers, Response.raw, Response.display))),
             *(Trial.part, Trial.kind, AnnotationRound.number, Trial.stimulus_id),
+            *(Response.instrument, *(cast(text, Text) for text in texts)),
         )
         .select_from(Response)
         .join(Trial, Response.trial_id == Trial.id)
         .join(Participant, Trial.participant_id == Participant.id)
         .outerjoin(AnnotationRound, Trial.round_id == AnnotationRound.id)
         .where(Participant.study_id == study.id)
-        .execution_options(yield_per=_BATCH)
     )
-    instruments: dict[str, int] = {}
     pages: dict[tuple[str, ...], int] = {}
     abouts: dict[tuple[Any, ...], int] = {}
-    parts: list[Ints] = [np.empty((8, 0), dtype=np.int64)]
-    for batch in result.partitions(_BATCH):
+    parts: list[Ints] = [np.empty((7, 0), dtype=np.int64)]
+    for batch in _batches(session, statement):
         columns = list(zip(*batch, strict=True))
         beside = map(found.beside.get, columns[2], repeat(()))
         codes = (
-            [instruments.setdefault(name, len(instruments)) for name in columns[5]],
-            [pages.setdefault(texts, len(pages)) for texts in zip(*columns[5:9], strict=True)],
-            [abouts.setdefault(about, len(abouts)) for about in zip(*columns[9:], beside, strict=True)],
+            [pages.setdefault(page, len(pages)) for page in zip(*columns[9:], strict=True)],
+            [abouts.setdefault(about, len(abouts)) for about in zip(*columns[5:9], beside, strict=True)],
         )
         parts.append(np.array([*columns[:5], *codes], dtype=np.int64))
-    named = {name: _instrument(spec, name) for name in instruments}
+    named = {name: _instrument(spec, name) for name in dict.fromkeys(name for name, *_ in pages)}
     # No text, or the text null, stands for answers from before raw and display were kept.
-    read = [(named[name], [json.loads(text or "null") or {} for text in texts]) for name, *texts in pages]
-    key, revision, trial, position, participant, instrument, page, about = np.concatenate(parts, axis=1)
+    read = [(named[name], [json.loads(text or "null") or {} for text in page]) for name, *page in pages]
+    key, revision, trial, position, participant, page, about = np.concatenate(parts, axis=1)
+    number = {name: place for place, name in enumerate(named)}
+    instrument = np.array([number[name] for name, *_ in pages], dtype=np.int64)
     return _Given(
-        *(key, revision, trial, position, participant, instrument, page, about),
-        [_Page(asked, *texts) for asked, texts in read],
+        *(key, revision, trial, position, participant, instrument[page] if pages else page, page, about),
+        [_Page(asked, *[*texts, {}, {}][:3]) for asked, texts in read],
         [
             _About(part, kind, None if number is None else number + 1, found.page(stimulus, others))
             for part, kind, number, stimulus, others in abouts
         ],
     )
+
+
+def _batches(session: Session, statement: Executable) -> Iterator[Sequence[Sequence[Any]]]:
+    """Yield the rows of a question, some thousands at a time, since there may be millions."""
+    connection = session.connection()
+    if connection.dialect.name == "sqlite":
+        # The driver's own tuples: to make rows of them takes as long again, and here is nothing to convert.
+        cursor = connection.execute(statement).cursor
+        while cursor is not None and (batch := cursor.fetchmany(_BATCH)):
+            yield batch
+    else:
+        yield from connection.execute(statement.execution_options(yield_per=_BATCH)).partitions()
 
 
 def _instrument(spec: StudySpec, name: str) -> Instrument:

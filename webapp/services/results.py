@@ -148,7 +148,9 @@ class _Evidence:
 
     @cached_property
     def _rows(self) -> pd.DataFrame:
-        return collected.read(self._session, self._study)
+        # How pages stood tells of straight lines alone.
+        displayed = self._spec.screening.straight_lining is not None
+        return collected.read(self._session, self._study, displayed=displayed)
 
     def analyse(self, part: str) -> FullReport:
         spec, rows = self._spec, self._rows
