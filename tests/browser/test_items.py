@@ -67,6 +67,12 @@ def _save(page: Page) -> None:
     page.locator(".send button").click()
 
 
+def _save_and_go_on(page: Page) -> None:
+    """Save, and wait for the next page: on a busy machine the old one would be answered again."""
+    with page.expect_navigation():
+        _save(page)
+
+
 def _play_all(page: Page) -> None:
     for k in range(page.locator(".clip [data-play]").count()):
         page.locator(".clip").nth(k).locator("[data-play]").click()
@@ -104,7 +110,7 @@ def _until(page: Page, part: str) -> None:
                 return
             continue
         _answer(page)
-        _save(page)
+        _save_and_go_on(page)
     raise AssertionError(f"{part} never came")
 
 
@@ -113,7 +119,7 @@ def _to_the_ratings(page: Page) -> None:
     _go_on(page)
     for _ in range(2):
         _answer(page)
-        _save(page)
+        _save_and_go_on(page)
     expect(page.locator(".feedback")).to_be_visible()
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 pytestmark = pytest.mark.usefixtures("experimenter")
-PAGES = ("", "mini/", "mini/clips.json", "mini/report.html", "mini/export.zip", "mini/figures/mos_by_condition.svg")
+PAGES = ("", "mini/", "mini/clips.json", "mini/report.html", "mini/report.zip", "mini/export.zip")
+PAGES += ("mini/figures/mos_by_condition.svg", "papers.html")
 
 
 @pytest.mark.parametrize("page", PAGES)
