@@ -2,9 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-import pandas as pd
-
-from evaluation.report import figures, full_html, latex, papers
+from evaluation.report import figures, html, latex, papers, table_files
 from evaluation.report.full import FullReport
 
 
@@ -25,13 +23,13 @@ def files(full: FullReport, *, prefix: str = "") -> Iterator[tuple[str, bytes]]:
         ``tables/NAME.csv`` with full digits and ``tables/NAME.tex`` as on the page; ``methods.txt``.
     """
     place = f"{prefix}/" if prefix else ""
-    page = full_html.render(full, folder=f"{place}tables/")
+    page = html.render(full, folder=f"{place}tables/")
     yield f"report-{prefix}.html" if prefix else "report.html", page.encode()
     for name in figures.shown(full.report):
         yield f"{place}figures/{name}.svg", _standalone(figures.draw(name, full.report))
         yield f"{place}figures/{name}.png", figures.draw_png(name, full.report)
     for name, frame in full.frames.items():
-        yield f"{place}tables/{name}.csv", to_csv(frame)
+        yield f"{place}tables/{name}.csv", table_files.to_csv(frame).encode()
     for section in full.sections:
         if section.rows:
             yield f"{place}tables/{section.name}.tex", latex.table(section).encode()
@@ -48,11 +46,6 @@ def study_files(reports: Mapping[str, FullReport]) -> Iterator[tuple[str, bytes]
 def papers_page() -> tuple[str, bytes]:
     """Return the page that sets the papers' printed tables beside what padlab makes of them."""
     return "papers.html", papers.render_papers().encode()
-
-
-def to_csv(frame: pd.DataFrame) -> bytes:
-    """Return a frame as CSV in UTF-8, numbers with all their digits."""
-    return frame.to_csv(index=False, lineterminator="\n").encode()
 
 
 def _standalone(svg: str) -> bytes:

@@ -116,11 +116,10 @@ def _model(report: StudyReport, one: Comparison) -> tuple[Section, dict[str, pd.
     rows.append(("SD of the rest", wording.number(found.sigma), "", ""))
     random = found.random_frame()
     frames = {
-        f"mixed_model_{slug}": found.means_frame(),
+        f"mixed_model_{slug}": pd.concat([found.means_frame(), random], ignore_index=True),
         f"mixed_fixed_{slug}": found.to_frame(),
         f"mixed_random_{slug}": random,
     }
-    frames[f"mixed_model_{slug}"] = pd.concat([frames[f"mixed_model_{slug}"], random], ignore_index=True)
     note = (
         "Means of the conditions by the linear mixed model, with intervals that hold for other raters and other "
         "stimuli, and the standard deviations of its random effects."

@@ -67,6 +67,16 @@ class Comparison:
 
     def matrix(self, unit: str) -> tuple[FloatArray, tuple[str, ...]]:
         """Return means of units (rows) in the conditions, and what was left out to have them complete."""
+        if unit not in self._matrices:
+            self._matrices[unit] = self._of_units(unit)
+        return self._matrices[unit]
+
+    @cached_property
+    def _matrices(self) -> dict[str, tuple[FloatArray, tuple[str, ...]]]:
+        """What `matrix` has found: several tests ask for the same."""
+        return {}
+
+    def _of_units(self, unit: str) -> tuple[FloatArray, tuple[str, ...]]:
         found = unit_means(self.table["value"].to_numpy(), self.table["condition"].tolist(), self.table[unit].tolist())
         places = [found.conditions.index(name) for name in self.conditions]
         return found.matrix[:, places], found.flags

@@ -4,6 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from evaluation.instruments.mos import MOS5
 from evaluation.report.analysis import StudyReport
 from evaluation.report.block import attempt
 from evaluation.report.drawing import COLOURS, GRID, INK, SHAPES, SOFT, drawable, prepare
@@ -20,7 +21,7 @@ MOST_CATEGORIES = 28
 MOST_POINTS = 20_000
 """Ratings above which they are not drawn one by one."""
 
-LOW, HIGH = 1.0, 5.0
+LOW, HIGH = (float(end(MOS5.items[0].values)) for end in (min, max))
 
 
 def has_ellipses(report: StudyReport) -> bool:

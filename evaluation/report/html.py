@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs nothing else: no scripts, no fonts, no network."""
+"""The full report as one HTML file that needs nothing else: no scripts, no fonts, no network."""
 
 from functools import cache
 
@@ -6,34 +6,44 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from evaluation.report import figures, tables
-from evaluation.report.analysis import StudyReport
+from evaluation.report.full import FullReport
+
+FOLD_ABOVE = 20
+"""Rows of a table above which the page shows it folded."""
 
 
-def render(report: StudyReport) -> str:
-    """Return the report as the text of an HTML file, the same for the same report.
+def render(full: FullReport, *, folder: str = "tables/", linked: bool = True) -> str:
+    """Return the full report as the text of an HTML file, the same for the same report.
 
     Parameters
     ----------
-    report : StudyReport
-        As `evaluation.report.analysis.analyse` returns it.
+    full : FullReport
+        The report.
+    folder : str
+        Where the files of tables lie, seen from the page.
+    linked : bool
+        Whether they do; otherwise the page says that they are in the archive of the report.
 
     Returns
     -------
     str
         HTML in English with figures as inline SVG; every text of the study is escaped.
     """
-    sections = tables.sections(report)
-    drawn = [section.name for section in sections if section.name in figures.NAMES]
     # Markup, since matplotlib has escaped the texts in its drawing.
-    drawings = {name: Markup(figures.draw(name, report)) for name in drawn}  # noqa: S704
+    drawings = {name: Markup(figures.draw(name, full.report)) for name in figures.shown(full.report)}  # noqa: S704
     return page(
         "report.html",
-        title=tables.title(report),
-        report=report,
-        sections=sections,
+        title=tables.title(full.report),
+        report=full.report,
+        sections=full.sections,
         drawings=drawings,
         caption=figures.caption,
-        headline=tables.headline(report),
+        headline=full.headline,
+        methods=full.methods,
+        folder=folder,
+        linked=linked,
+        further=full.further,
+        fold_above=FOLD_ABOVE,
     )
 
 

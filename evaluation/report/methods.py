@@ -79,9 +79,8 @@ def methods(report: StudyReport, blocks: Mapping[str, Block]) -> str:
 
 def _instruments(report: StudyReport) -> list[str]:
     known = {
-        "pad12": "Pleasure, arousal and dominance were rated with the 12-item abbreviated PAD scale and scored by Eq. "
-        "13 of "
-        "Jia et al. (2013).",
+        "pad12": "Pleasure, arousal and dominance were rated with the 12-item abbreviated PAD scale and scored by "
+        "Eq. 13 of Jia et al. (2013).",
         "pad5": "Pleasure, arousal and dominance were rated directly on five points.",
         "sam": "Pleasure, arousal and dominance were rated with the Self-Assessment Manikin (Bradley and Lang, 1994).",
         "mos5": "Opinions were given on the five-point scale of absolute category rating (ITU-T P.800).",
@@ -149,9 +148,8 @@ def _screened(report: StudyReport) -> list[str]:
     rules = [one for one in dict.fromkeys(finding.rule for finding in report.screening.findings) if one != MANUAL]
     every, used = len(report.screening.raters), len(report.screening.used)
     by = [f"by rules fixed in the study file ({', '.join(rules)})"] if rules else []
-    by += (
-        ["by the experimenter's own decisions"] if len(rules) < len({f.rule for f in report.screening.findings}) else []
-    )
+    if any(finding.rule == MANUAL for finding in report.screening.findings):
+        by.append("by the experimenter's own decisions")
     sentence = f"Raters were screened {' and '.join(by)}; {every - used} of {every} were left out"
     if used == every:
         return [f"{sentence}."]

@@ -112,7 +112,7 @@ def _adjusted(test: Comparisons | Unavailable, a: str, b: str) -> str:
 
 
 def _p(p: float) -> str:
-    return NOTHING if math.isnan(p) else wording.p_value(p).removeprefix("p ").removeprefix("= ")
+    return NOTHING if math.isnan(p) else wording.p_column(p)
 
 
 def _effects(

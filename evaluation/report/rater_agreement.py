@@ -168,7 +168,7 @@ def _icc(found: dict[str, IntraclassCorrelations | Unavailable]) -> Section | No
             NOTHING if one.value is None else wording.share(one.value),
             _between(one.ci),
             f"F({one.df1}, {one.df2}) {'infinite' if np.isinf(one.F) else f'= {wording.number(one.F)}'}",
-            wording.p_value(one.p).removeprefix("p ").removeprefix("= "),
+            wording.p_column(one.p),
         )
         for score, result in known.items()
         for one in result.forms

@@ -186,7 +186,7 @@ def _reverse_evaluation(report: StudyReport) -> Section:
                 str(result.n),
                 wording.share(result.r, 3),
                 interval,
-                wording.p_value(result.p).removeprefix("p ").removeprefix("= "),
+                wording.p_column(result.p),
                 wording.number(result.slope),
                 wording.number(result.intercept),
                 published,
@@ -256,7 +256,7 @@ def _mos_anova(report: StudyReport) -> Section:
     if isinstance(found, Unavailable):
         return Section("mos_anova", title, header, 1, (), (found.reason,))
     between, within = found.SSB / found.df_between, found.SSW / found.df_within
-    p = wording.p_value(found.p).removeprefix("p ").removeprefix("= ")
+    p = wording.p_column(found.p)
     rows = (
         ("Between conditions", _three(found.SSB), str(found.df_between), _three(between), wording.number(found.F), p),
         ("Within conditions", _three(found.SSW), str(found.df_within), _three(within), "", ""),

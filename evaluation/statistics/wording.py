@@ -25,6 +25,11 @@ def p_value(p: float) -> str:
     return f"p = {share(p, 3)}" if p < 0.9995 else "p > .999"
 
 
+def p_column(p: float) -> str:
+    """Return a probability under a head that says p, for instance ``.034`` or ``< .001``."""
+    return p_value(p).removeprefix("p ").removeprefix("= ")
+
+
 def interval(low: float, high: float, *, confidence: float, bounded: bool = False) -> str:
     """Return ``95% CI [0.31, 0.62]``; without leading zeros if `bounded` by 1."""
     write = share if bounded else number

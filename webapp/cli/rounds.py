@@ -137,7 +137,7 @@ def _share(value: float | None) -> str:
 def _p(value: float | None) -> str:
     if value is None:
         return "-"
-    return wording.p_value(value).removeprefix("p ").removeprefix("= ")
+    return wording.p_column(value)
 
 
 def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:

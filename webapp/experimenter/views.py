@@ -11,7 +11,7 @@ from flask_login import current_user, login_user, logout_user
 from sqlalchemy.orm import Session
 from werkzeug.wrappers import Response as BaseResponse
 
-from evaluation.report import bundle, figures, full_html, tables
+from evaluation.report import bundle, figures, html, tables
 from webapp import locale, security
 from webapp.errors import NotFoundError
 from webapp.experimenter.login import Account, login_manager
@@ -125,7 +125,7 @@ def figure(slug: str, name: str) -> Response:
 def report(slug: str) -> Response:
     """Send the whole report of a part (the first unless one is named) as one file."""
     with parts().database.read() as db:
-        page = full_html.render(results.full_report(db, slug, request.args.get("part")), linked=False)
+        page = html.render(results.full_report(db, slug, request.args.get("part")), linked=False)
     response = Response(page, mimetype="text/html")
     response.headers["Content-Security-Policy"] = security.REPORT_POLICY
     return response

@@ -30,11 +30,15 @@ class ReportCache:
         """Return the report that is kept under a key, or make it; whoever asks for it meanwhile waits."""
         with self._lock:
             making = self._making.setdefault(key, Lock())
-        with making:
-            found = self._taken(key)
-            if found is None:
-                found = make()
-            self._keep(key, found)
+        try:
+            with making:
+                found = self._taken(key)
+                if found is None:
+                    found = make()
+                self._keep(key, found)
+        finally:
+            with self._lock:
+                self._making.pop(key, None)
         return found
 
     def _taken(self, key: Hashable) -> FullReport | None:
@@ -45,7 +49,6 @@ class ReportCache:
         with self._lock:
             self._kept[key] = found
             self._kept.move_to_end(key)
-            self._making.pop(key, None)
             while len(self._kept) > 1 and (len(self._kept) > REPORTS or self._rows() > ROWS):
                 self._kept.popitem(last=False)
 

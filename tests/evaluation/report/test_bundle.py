@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from evaluation.report import bundle
+from evaluation.report import bundle, table_files
 from evaluation.report.analysis import analyse
 from evaluation.report.full import FullReport
 from evaluation.simulate import simulate_responses
@@ -100,7 +100,7 @@ def test_tables_have_all_their_digits(files, full):
 
 
 def test_text_is_utf_8():
-    assert bundle.to_csv(pd.DataFrame({"a": ["高兴", 'x,"y"'], "b": [0.1, None]})).decode() == (
+    assert table_files.to_csv(pd.DataFrame({"a": ["高兴", 'x,"y"'], "b": [0.1, None]})) == (
         'a,b\n高兴,0.1\n"x,""y""",\n'
     )
 

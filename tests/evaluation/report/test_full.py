@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from evaluation.report import full_html
+from evaluation.report import html
 from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
 from evaluation.report.full import FullReport
 from evaluation.screening import ScreeningData, screen
@@ -200,7 +200,7 @@ def test_texts_of_the_study_are_escaped_on_the_page(build):
     spec = StudySpec.model_validate(content)
     full = FullReport(analyse(spec, simulate_responses(spec, 4, seed=1)))
     check(full)
-    page = full_html.render(full)
+    page = html.render(full)
     assert "<b>" not in page
     assert page.count("&lt;b&gt;&amp;") > 10
     assert "高兴" in page
@@ -229,13 +229,13 @@ def test_files_of_no_table_are_named(crossed):
 
 
 def test_long_tables_are_folded(crossed, monkeypatch):
-    monkeypatch.setattr(full_html.figures, "shown", lambda report: ())
-    page = full_html.render(crossed)
+    monkeypatch.setattr(html.figures, "shown", lambda report: ())
+    page = html.render(crossed)
     assert page.count("<details") == page.count("</details>")
     opened = re.split("<section", page)
     for section in crossed.sections:
         own = next(text for text in opened if f'id="{section.name}"' in text.partition(">")[0] + ">")
-        assert ("<details" in own) == (len(section.rows) > full_html.FOLD_ABOVE), section.name
+        assert ("<details" in own) == (len(section.rows) > html.FOLD_ABOVE), section.name
     for name in crossed.further:
         assert f"{name}.csv" in page
 

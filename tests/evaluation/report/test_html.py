@@ -6,6 +6,7 @@ from markupsafe import escape
 
 from evaluation.report import html
 from evaluation.report.analysis import RESPONSE_COLUMNS, analyse
+from evaluation.report.full import FullReport
 
 EMPTY = pd.DataFrame(columns=list(RESPONSE_COLUMNS))
 VOID = {"meta", "link", "br", "img", "hr", "input"}
@@ -14,7 +15,7 @@ VOID = {"meta", "link", "br", "img", "hr", "input"}
 @pytest.fixture(scope="module")
 def written(report) -> str:
     """The page of the report."""
-    return html.render(report)
+    return html.render(FullReport(report), linked=False)
 
 
 class Page(HTMLParser):
@@ -47,7 +48,7 @@ class Page(HTMLParser):
 
 def test_the_page_is_whole_and_needs_nothing_from_elsewhere(written):
     page = Page(written)
-    assert page.tags.count("svg") == 2
+    assert page.tags.count("svg") == 4
     assert not {"script", "link", "iframe", "img"} & set(page.tags)
     assert all(address.startswith("#") for address in page.addresses)
     assert len(page.ids) == len(set(page.ids))
@@ -59,17 +60,17 @@ def test_it_says_what_the_report_says(report, written):
 
 
 def test_the_same_report_gives_the_same_page(report, written):
-    assert html.render(report) == written
+    assert html.render(FullReport(report), linked=False) == written
 
 
 def test_without_answers(demo):
-    text = html.render(analyse(demo, EMPTY))
+    text = html.render(FullReport(analyse(demo, EMPTY)))
     Page(text)
     assert "There are no answers yet." in text
 
 
 def test_texts_of_the_study_are_escaped(demo, answers):
     spec = demo.model_copy(update={"title": {"en": "<script>alert(1)</script>", "zh": "x"}})
-    text = html.render(analyse(spec, answers))
+    text = html.render(FullReport(analyse(spec, answers)))
     assert "<script" not in text
     assert "&lt;script&gt;alert(1)" in text
